@@ -1,0 +1,47 @@
+# What a user and a developer type. `make` alone lists the targets.
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+
+TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
+CAUSTICA := $(TARGET_DIR)/release/caustica
+DEMO := projects/gallery/gallery.caustica.json
+# Of the demo picture; `make demo SIZE=1920x1080 SAMPLES=256` overrides them.
+SIZE ?= 1280x720
+SAMPLES ?= 64
+
+.PHONY: help setup compiler demo test check clean
+
+help: ## list these targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+
+setup: ## install what is missing, build, find a device that can trace rays
+	@scripts/setup.sh
+
+# The window where there is a display, otherwise a picture; `DISPLAY= make demo` asks for the picture.
+demo: setup ## open the demo project, or render out/demo.png where there is no display
+	@if [ -n "$${DISPLAY:-}$${WAYLAND_DISPLAY:-}" ]; then \
+	  exec $(CAUSTICA) $(DEMO); \
+	else \
+	  mkdir -p out; \
+	  exec $(CAUSTICA) render $(DEMO) -o out/demo.png --size $(SIZE) --samples $(SAMPLES); \
+	fi
+
+test: ## all tests, headless (installs the test tools that are missing)
+	@scripts/setup.sh --test
+	cargo test --release --workspace
+
+# In the release profile, so that the build scripts of the dependencies (glslang's C++ above all) run once for
+# demo, check and test.
+check: compiler ## format, lints and documentation, warnings as errors
+	cargo fmt --all --check
+	cargo clippy --release --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --workspace
+
+compiler:
+	@scripts/setup.sh --compiler
+
+clean: ## remove what was built and rendered
+	cargo clean
+	rm -rf out

@@ -1,0 +1,14 @@
+//! What nodes refer to: meshes, materials, textures, lights, cameras, the environment.
+//! Plain data, large arrays behind `Arc` so that clones are cheap. Knows no file format and no device.
+
+mod environment;
+mod light;
+mod material;
+mod mesh;
+mod texture;
+
+pub use environment::{Environment, EnvironmentFile, RadianceMap};
+pub use light::{Camera, Light, LightKind, Projection};
+pub use material::{AlphaMode, Material, ShadingMode};
+pub use mesh::{Mesh, MeshData, Primitive};
+pub use texture::{Sampler, Texture, TextureUse, Wrap};

@@ -1,0 +1,96 @@
+//! Meshes: shared vertices, cut into primitives.
+//! Plain data with bounds; knows no file format and no device.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+
+use crate::ids::MaterialId;
+
+/// Vertices and indices. All arrays but `tex_coords1` and `colors` hold one entry a vertex; those two
+/// may be empty. Every index is below `positions.len()`, every number is finite.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshData {
+    /// Positions, mesh space, metres.
+    pub positions: Vec<Vec3>,
+    /// Unit normals.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents; w is the handedness, 1 or -1 (glTF 2.0, section 3.7.2.1).
+    pub tangents: Vec<Vec4>,
+    /// First set of texture coordinates; zeros when the file has none.
+    pub tex_coords0: Vec<Vec2>,
+    /// Second set of texture coordinates, or empty.
+    pub tex_coords1: Vec<Vec2>,
+    /// Linear vertex colours with alpha, or empty.
+    pub colors: Vec<Vec4>,
+    /// Three a triangle, the primitives one after the other.
+    pub indices: Vec<u32>,
+}
+
+/// A mesh: shared vertices, cut into primitives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    /// Shown in the outliner.
+    pub name: String,
+    /// Vertices and indices.
+    pub data: Arc<MeshData>,
+    /// Ranges of the indices.
+    pub primitives: Vec<Primitive>,
+    /// Smallest and largest corner in mesh space, primitive transforms included; `None` without triangles.
+    pub bounds: Option<(DVec3, DVec3)>,
+}
+
+/// A range of a mesh's indices with one material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Primitive {
+    /// First index, a multiple of 3.
+    pub first_index: u32,
+    /// Number of indices, a multiple of 3.
+    pub index_count: u32,
+    /// Material unless the node or part says otherwise.
+    pub material: MaterialId,
+    /// Places the primitive inside its mesh; identity on import.
+    pub mesh_from_primitive: DAffine3,
+}
+
+impl Mesh {
+    /// A mesh with its bounds computed.
+    pub fn new(name: String, data: Arc<MeshData>, primitives: Vec<Primitive>) -> Self {
+        let mut mesh = Self { name, data, primitives, bounds: None };
+        mesh.update_bounds();
+        mesh
+    }
+
+    /// Computes `bounds` again, as after a primitive moved.
+    pub fn update_bounds(&mut self) {
+        self.bounds = self
+            .primitives
+            .iter()
+            .filter_map(|primitive| self.primitive_bounds(primitive))
+            .reduce(|(a0, a1), (b0, b1)| (a0.min(b0), a1.max(b1)));
+    }
+
+    /// Smallest and largest corner of one primitive, mesh space.
+    pub fn primitive_bounds(&self, primitive: &Primitive) -> Option<(DVec3, DVec3)> {
+        self.indices_of(primitive)
+            .iter()
+            .filter_map(|&index| self.data.positions.get(index as usize))
+            .map(|p| primitive.mesh_from_primitive.transform_point3(p.as_dvec3()))
+            .fold(None, |bounds, p| match bounds {
+                None => Some((p, p)),
+                Some((low, high)) => Some((p.min(low), p.max(high))),
+            })
+    }
+
+    /// The indices of one primitive; empty when its range lies outside the mesh.
+    pub fn indices_of(&self, primitive: &Primitive) -> &[u32] {
+        let first = primitive.first_index as usize;
+        let end = first.saturating_add(primitive.index_count as usize);
+        self.data.indices.get(first..end).unwrap_or(&[])
+    }
+
+    /// Number of triangles of all primitives.
+    pub fn triangle_count(&self) -> usize {
+        self.primitives.iter().map(|p| p.index_count as usize / 3).sum()
+    }
+}

@@ -1,0 +1,364 @@
+//! Numerical audit of a scene: what cannot be rendered as it stands, and what will look wrong.
+//! In: a document. Out: findings that name what they are about. It changes nothing.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use glam::DAffine3;
+
+use crate::assets::{AlphaMode, Material, Mesh};
+use crate::document::Document;
+use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
+use crate::import::geometry::has_no_area;
+use crate::node::NodeKind;
+use crate::transform::is_degenerate;
+
+/// Longest by shortest axis of a transform above which single precision gets coarse.
+const LARGE_SCALE_RATIO: f64 = 1e4;
+/// Distance from the origin, in sizes of the object, above which single precision alone would show steps.
+const FAR_IN_SIZES: f64 = 1e6;
+
+/// How bad a finding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Severity {
+    /// Worth knowing.
+    Info,
+    /// It will look wrong or cost precision.
+    Warning,
+    /// It cannot be rendered and is left out.
+    Error,
+}
+
+/// What a finding is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Subject {
+    /// A node or part.
+    Target(Target),
+    /// A prefab.
+    Prefab(PrefabId),
+    /// A mesh.
+    Mesh(MeshId),
+    /// A material.
+    Material(MaterialId),
+    /// A texture.
+    Texture(TextureId),
+    /// The scene as a whole.
+    Scene,
+}
+
+/// One result of the audit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// How bad it is.
+    pub severity: Severity,
+    /// What it is about.
+    pub subject: Subject,
+    /// Name of the subject, to show.
+    pub name: String,
+    /// In words, with what to do where that is not plain.
+    pub message: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let severity = match self.severity {
+            Severity::Info => "note",
+            Severity::Warning => "warning",
+            Severity::Error => "error",
+        };
+        write!(f, "{severity}: {}: {}", self.name, self.message)
+    }
+}
+
+/// Looks through a document; the worst findings come first, then in order of subject.
+pub fn audit(document: &Document) -> Vec<Finding> {
+    let mut audit = Audit { document, findings: Vec::new() };
+    audit.prefabs();
+    audit.transforms();
+    for (id, mesh) in document.meshes() {
+        audit.mesh(id, mesh);
+    }
+    for (id, material) in document.materials() {
+        audit.material(id, material);
+    }
+    audit.textures();
+    audit.scene();
+    let mut findings = audit.findings;
+    findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.subject));
+    findings
+}
+
+struct Audit<'a> {
+    document: &'a Document,
+    findings: Vec<Finding>,
+}
+
+impl Audit<'_> {
+    fn add(&mut self, severity: Severity, subject: Subject, name: &str, message: String) {
+        let id = match subject {
+            Subject::Target(target) => target.node.0,
+            Subject::Prefab(id) => id.0,
+            Subject::Mesh(id) => id.0,
+            Subject::Material(id) => id.0,
+            Subject::Texture(id) => id.0,
+            Subject::Scene => 0,
+        };
+        let kind = match subject {
+            Subject::Target(_) => "node",
+            Subject::Prefab(_) => "prefab",
+            Subject::Mesh(_) => "mesh",
+            Subject::Material(_) => "material",
+            Subject::Texture(_) => "texture",
+            Subject::Scene => "scene",
+        };
+        self.findings.push(Finding { severity, subject, name: crate::edit::shown(name, kind, id), message });
+    }
+
+    fn prefabs(&mut self) {
+        for (id, prefab) in self.document.prefabs().filter(|(_, p)| p.missing) {
+            let message = format!(
+                "{} could not be read; put the file back or choose another source",
+                prefab.source.display()
+            );
+            self.add(Severity::Error, Subject::Prefab(id), &prefab.name, message);
+        }
+        for (id, node) in self.document.nodes() {
+            let NodeKind::Prefab { prefab, overrides } = &node.kind else {
+                continue;
+            };
+            let Some(prefab) = self.document.prefab(*prefab).filter(|p| !p.missing) else {
+                continue;
+            };
+            let lost = overrides.keys().filter(|path| prefab.part_at(path).is_none());
+            let lost: Vec<&str> = lost.map(|path| path.0.as_str()).collect();
+            if !lost.is_empty() {
+                let subject = Subject::Target(Target::node(id));
+                let message = format!(
+                    "changes to parts that the source no longer has are kept aside: {}",
+                    lost.join(", ")
+                );
+                self.add(Severity::Warning, subject, &node.name, message);
+            }
+        }
+    }
+
+    fn transforms(&mut self) {
+        let placed: Vec<(Target, DAffine3, Option<MeshId>)> = self
+            .document
+            .renderables()
+            .map(|r| (r.target, r.world_from_mesh, Some(r.mesh)))
+            .chain(self.document.lights().map(|l| (l.target, l.world_from_node, None)))
+            .chain(self.document.cameras().map(|c| (c.target, c.world_from_node, None)))
+            .collect();
+        for (target, world, mesh) in placed {
+            let name = self.document.display_name(target);
+            let subject = Subject::Target(target);
+            if !world.is_finite() {
+                let message = "its place in the world is not finite; it is left out".to_owned();
+                self.add(Severity::Error, subject, &name, message);
+                continue;
+            }
+            // Lights and cameras take no scale from their node.
+            let Some(mesh) = mesh else { continue };
+            if is_degenerate(&world) {
+                let message = "it is scaled to nothing in some direction; it is left out".to_owned();
+                self.add(Severity::Error, subject, &name, message);
+                continue;
+            }
+            let m = world.matrix3;
+            let lengths = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];
+            let longest = lengths.into_iter().fold(0.0, f64::max);
+            let shortest = lengths.into_iter().fold(f64::INFINITY, f64::min);
+            if longest / shortest > LARGE_SCALE_RATIO {
+                let message = format!("its axes are scaled very differently, {:.0} to 1", longest / shortest);
+                self.add(Severity::Warning, subject, &name, message);
+            }
+            let size = self.document.mesh(mesh).and_then(|m| m.bounds);
+            let size = size.map_or(0.0, |(low, high)| (high - low).length() * longest);
+            if size > 0.0 && world.translation.length() / size > FAR_IN_SIZES {
+                let message = format!(
+                    "it is {:.3e} m from the origin and {size:.3e} m large",
+                    world.translation.length()
+                );
+                self.add(Severity::Info, subject, &name, message);
+            }
+        }
+    }
+
+    fn mesh(&mut self, id: MeshId, mesh: &Mesh) {
+        let data = &mesh.data;
+        let subject = Subject::Mesh(id);
+        let finite = |bad: usize, what: &str| (bad > 0).then(|| format!("{bad} {what} are not finite"));
+        let bad_positions = data.positions.iter().filter(|p| !p.is_finite()).count();
+        let bad_normals = data.normals.iter().filter(|n| !n.is_finite()).count();
+        let bad_tangents = data.tangents.iter().filter(|t| !t.is_finite()).count();
+        for message in [
+            finite(bad_positions, "positions"),
+            finite(bad_normals, "normals"),
+            finite(bad_tangents, "tangents"),
+        ]
+        .into_iter()
+        .flatten()
+        {
+            self.add(Severity::Error, subject, &mesh.name, message);
+        }
+        let (mut degenerate, mut outside) = (0_usize, 0_usize);
+        for primitive in &mesh.primitives {
+            let (triangles, _) = mesh.indices_of(primitive).as_chunks::<3>();
+            for triangle in triangles {
+                match triangle.map(|i| data.positions.get(i as usize)) {
+                    [Some(p), Some(q), Some(r)] => {
+                        degenerate += usize::from(has_no_area(*p, *q, *r));
+                    }
+                    _ => outside += 1,
+                }
+            }
+            if is_degenerate(&primitive.mesh_from_primitive) {
+                let message = "a primitive is scaled to nothing in some direction".to_owned();
+                self.add(Severity::Error, subject, &mesh.name, message);
+            }
+        }
+        if degenerate > 0 {
+            let message = format!("{degenerate} triangles have no area");
+            self.add(Severity::Warning, subject, &mesh.name, message);
+        }
+        if outside > 0 {
+            let message = format!("{outside} triangles name vertices that do not exist");
+            self.add(Severity::Error, subject, &mesh.name, message);
+        }
+    }
+
+    fn material(&mut self, id: MaterialId, material: &Material) {
+        let subject = Subject::Material(id);
+        if !material.is_finite() {
+            let message = "a value is not a finite number".to_owned();
+            self.add(Severity::Error, subject, &material.name, message);
+        }
+        let unit = 0.0..=1.0_f32;
+        let cutoff = match material.alpha {
+            AlphaMode::Mask { cutoff } => cutoff,
+            AlphaMode::Opaque | AlphaMode::Blend => 0.0,
+        };
+        let ranged = [
+            ("base colour", material.base_color.max_element(), &unit),
+            ("base colour", material.base_color.min_element(), &unit),
+            ("metallic", material.metallic, &unit),
+            ("roughness", material.roughness, &unit),
+            ("transmission", material.transmission, &unit),
+            ("specular", material.specular, &unit),
+            ("occlusion strength", material.occlusion_strength, &unit),
+            ("alpha cutoff", cutoff, &unit),
+        ];
+        let mut outside: BTreeMap<&str, f32> = ranged
+            .into_iter()
+            .filter(|(_, value, range)| value.is_finite() && !range.contains(value))
+            .map(|(what, value, _)| (what, value))
+            .collect();
+        if material.ior < 1.0 {
+            outside.insert("index of refraction", material.ior);
+        }
+        if material.emitted_radiance().min_element() < 0.0 {
+            outside.insert("emission", material.emitted_radiance().min_element());
+        }
+        for (what, value) in outside {
+            let message = format!("{what} is {value}, outside of what is physical");
+            self.add(Severity::Warning, subject, &material.name, message);
+        }
+        let missing = |id: &TextureId| self.document.texture(*id).is_none();
+        let lost = material.textures().filter(|u| missing(&u.texture)).count();
+        if lost > 0 {
+            let message = format!("{lost} of its textures are missing");
+            self.add(Severity::Error, subject, &material.name, message);
+        }
+    }
+
+    fn textures(&mut self) {
+        for (id, texture) in self.document.textures().filter(|(_, t)| t.placeholder) {
+            let message = "the image could not be read; a checker stands in".to_owned();
+            self.add(Severity::Warning, Subject::Texture(id), &texture.name, message);
+        }
+    }
+
+    fn scene(&mut self) {
+        if self.document.renderables().next().is_none() {
+            let message = "there is nothing to see: no mesh is placed".to_owned();
+            self.add(Severity::Info, Subject::Scene, "scene", message);
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use glam::{DVec3, Vec3};
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::assets::{MeshData, Primitive};
+    use crate::edit::Edit;
+    use crate::import::Imported;
+    use crate::prefab::{PartNode, Prefab};
+    use crate::transform::{Local, Trs};
+
+    fn with_triangle(scale: DVec3, corner: Vec3) -> Document {
+        let data = MeshData {
+            positions: vec![Vec3::ZERO, Vec3::X, corner],
+            normals: vec![Vec3::Z; 3],
+            tangents: vec![Vec3::X.extend(1.0); 3],
+            tex_coords0: vec![Default::default(); 3],
+            indices: vec![0, 1, 2],
+            ..MeshData::default()
+        };
+        let primitive = Primitive {
+            first_index: 0,
+            index_count: 3,
+            material: MaterialId(0),
+            mesh_from_primitive: DAffine3::IDENTITY,
+        };
+        let mut prefab = Prefab::new("triangle", "triangle.gltf");
+        let part = PartNode { visible: true, mesh: Some(MeshId(0)), ..PartNode::default() };
+        prefab.set_nodes(vec![part]).unwrap();
+        let imported = Imported {
+            prefab,
+            meshes: vec![Mesh::new("t".to_owned(), Arc::new(data), vec![primitive])],
+            materials: vec![Material::default()],
+            ..Imported::default()
+        };
+        let mut document = Document::new();
+        let prefab = document.add_imported(imported).unwrap();
+        let trs = Trs { scale, ..Trs::IDENTITY };
+        let (_, edit) = document.instantiate_edit(prefab, None, Local::Trs(trs));
+        document.apply(edit).unwrap();
+        document
+    }
+
+    fn messages(document: &Document) -> Vec<String> {
+        audit(document).iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_sound_scene_has_no_findings() {
+        assert_eq!(messages(&with_triangle(DVec3::ONE, Vec3::Y)), [""; 0]);
+    }
+
+    #[test]
+    fn faults_are_found() {
+        let flat = with_triangle(DVec3::new(1.0, 0.0, 1.0), Vec3::Y);
+        assert_eq!(audit(&flat)[0].severity, Severity::Error);
+        let stretched = with_triangle(DVec3::new(1e6, 1.0, 1.0), Vec3::Y);
+        assert!(messages(&stretched)[0].contains("1000000 to 1"));
+        let nan = with_triangle(DVec3::ONE, Vec3::NAN);
+        assert!(messages(&nan)[0].contains("1 positions are not finite"));
+        let line = with_triangle(DVec3::ONE, Vec3::X * 2.0);
+        assert!(messages(&line)[0].contains("no area"));
+    }
+
+    #[test]
+    fn a_material_out_of_range_is_found() {
+        let mut document = with_triangle(DVec3::ONE, Vec3::Y);
+        let (material, value) = document.materials().next().unwrap();
+        let value = Material { roughness: 2.0, ..value.clone() };
+        document.apply(Edit::SetMaterial { material, value: Box::new(value) }).unwrap();
+        assert!(messages(&document)[0].contains("roughness is 2"));
+    }
+}

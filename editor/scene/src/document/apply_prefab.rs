@@ -1,0 +1,161 @@
+//! Carries out edits of prefabs: add, remove, and put a new reading of the source in place.
+//! A prefab goes with its meshes, materials and textures.
+
+use super::Document;
+use crate::edit::{Edit, EditError, shown};
+use crate::ids::{MaterialId, MeshId, NodeId, PrefabId};
+use crate::node::NodeKind;
+use crate::package::PrefabPackage;
+use crate::prefab::Prefab;
+
+impl Document {
+    pub(super) fn add_prefab(&mut self, package: PrefabPackage) -> Result<Edit, EditError> {
+        let id = package.id;
+        if self.prefabs.contains_key(&id) {
+            return Err(EditError::Taken(format!("prefab {}", id.0)));
+        }
+        let taken = package
+            .meshes
+            .iter()
+            .find(|(id, _)| self.meshes.contains_key(id))
+            .map(|(id, _)| format!("mesh {}", id.0))
+            .or_else(|| {
+                let mut materials = package.materials.iter();
+                materials
+                    .find(|(id, _)| self.materials.contains_key(id))
+                    .map(|(id, _)| format!("material {}", id.0))
+            })
+            .or_else(|| {
+                let mut textures = package.textures.iter();
+                textures
+                    .find(|(id, _)| self.textures.contains_key(id))
+                    .map(|(id, _)| format!("texture {}", id.0))
+            });
+        if let Some(taken) = taken {
+            return Err(EditError::Taken(taken));
+        }
+        self.insert_package(package);
+        Ok(Edit::RemovePrefab { prefab: id })
+    }
+
+    pub(super) fn remove_prefab(&mut self, id: PrefabId) -> Result<Edit, EditError> {
+        let package = self.package_of(id).ok_or_else(|| EditError::NoAsset(format!("prefab {}", id.0)))?;
+        if let Some(by) = self.user_of_prefab(id, &package.prefab) {
+            let what = format!("prefab {}", package.prefab.name);
+            return Err(EditError::InUse { what, by });
+        }
+        self.take_package(&package);
+        Ok(Edit::AddPrefab(Box::new(package)))
+    }
+
+    pub(super) fn replace_prefab(&mut self, package: PrefabPackage) -> Result<Edit, EditError> {
+        let id = package.id;
+        let old = self.package_of(id).ok_or_else(|| EditError::NoAsset(format!("prefab {}", id.0)))?;
+        let instances: Vec<NodeId> =
+            self.slots.iter().filter(|(_, slot)| slot.node.prefab() == Some(id)).map(|(id, _)| *id).collect();
+        for &node in &instances {
+            self.report_removed(node);
+        }
+        self.take_package(&old);
+        self.insert_package(package);
+        for node in instances {
+            let parts = self.node(node).map(|node| self.part_states(node));
+            if let (Some(parts), Some(slot)) = (parts, self.slots.get_mut(&node)) {
+                slot.parts = parts;
+            }
+            self.mark_dirty(node);
+            self.report_added(node);
+        }
+        Ok(Edit::ReplacePrefab(Box::new(old)))
+    }
+
+    fn insert_package(&mut self, package: PrefabPackage) {
+        self.reserve_ids_up_to(package.id.0);
+        for (id, mesh) in package.meshes {
+            self.reserve_ids_up_to(id.0);
+            self.meshes.insert(id, mesh);
+            self.changes.removed_meshes.remove(&id);
+            self.changes.meshes.insert(id);
+        }
+        for (id, entry) in package.materials {
+            self.reserve_ids_up_to(id.0);
+            self.materials.insert(id, entry);
+            self.changes.removed_materials.remove(&id);
+            self.changes.materials.insert(id);
+        }
+        for (id, texture) in package.textures {
+            self.reserve_ids_up_to(id.0);
+            self.textures.insert(id, texture);
+            self.changes.removed_textures.remove(&id);
+            self.changes.textures.insert(id);
+        }
+        self.prefabs.insert(package.id, package.prefab);
+        self.changes.structure = true;
+    }
+
+    fn take_package(&mut self, package: &PrefabPackage) {
+        self.prefabs.remove(&package.id);
+        for (id, _) in &package.meshes {
+            self.meshes.remove(id);
+            self.changes.meshes.remove(id);
+            self.changes.primitive_transforms.remove(id);
+            self.changes.removed_meshes.insert(*id);
+        }
+        for (id, _) in &package.materials {
+            self.materials.remove(id);
+            self.changes.materials.remove(id);
+            self.changes.removed_materials.insert(*id);
+        }
+        for (id, _) in &package.textures {
+            self.textures.remove(id);
+            self.changes.textures.remove(id);
+            self.changes.removed_textures.insert(*id);
+        }
+        self.changes.structure = true;
+    }
+
+    /// Who places the prefab, or uses one of its meshes or materials from outside of it.
+    fn user_of_prefab(&self, id: PrefabId, prefab: &Prefab) -> Option<String> {
+        self.slots.iter().find_map(|(node_id, slot)| {
+            let uses = match &slot.node.kind {
+                NodeKind::Prefab { prefab: other, overrides } => {
+                    *other == id
+                        || overrides
+                            .values()
+                            .flat_map(|o| o.materials.values())
+                            .any(|material| prefab.materials.contains(material))
+                }
+                NodeKind::Mesh { mesh, materials } => {
+                    prefab.meshes.contains(mesh) || materials.iter().any(|m| prefab.materials.contains(m))
+                }
+                NodeKind::Group | NodeKind::Light(_) | NodeKind::Camera(_) => false,
+            };
+            uses.then(|| shown(&slot.node.name, "node", node_id.0))
+        })
+    }
+
+    /// Who uses a material: a mesh's primitive, a node, an override or the prefab that brought it.
+    pub(super) fn user_of_material(&self, id: MaterialId) -> Option<String> {
+        let prefab = self.prefabs.values().find(|p| p.materials.contains(&id));
+        if let Some(prefab) = prefab {
+            return Some(format!("prefab {}", prefab.name));
+        }
+        let mesh = |(mesh_id, mesh): (MeshId, &crate::assets::Mesh)| {
+            let used = mesh.primitives.iter().any(|p| p.material == id);
+            used.then(|| shown(&mesh.name, "mesh", mesh_id.0))
+        };
+        if let Some(user) = self.meshes().find_map(mesh) {
+            return Some(user);
+        }
+        self.slots.iter().find_map(|(node_id, slot)| {
+            let uses = match &slot.node.kind {
+                NodeKind::Prefab { overrides, .. } => {
+                    overrides.values().flat_map(|o| o.materials.values()).any(|m| *m == id)
+                }
+                NodeKind::Mesh { materials, .. } => materials.contains(&id),
+                NodeKind::Group | NodeKind::Light(_) | NodeKind::Camera(_) => false,
+            };
+            uses.then(|| shown(&slot.node.name, "node", node_id.0))
+        })
+    }
+}

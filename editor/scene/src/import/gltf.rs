@@ -1,0 +1,97 @@
+//! glTF 2.0, `.gltf` and `.glb`: container, checks, then meshes, materials, textures and the node tree.
+//! In: a path. Out: [`Imported`]. The JSON is read by our own checked reader: node transforms stay in double
+//! precision, errors name a JSON pointer, and nothing is indexed before it was checked.
+
+use std::path::Path;
+
+use super::{ImportError, ImportOptions, Imported, Warning, file_stem, read_model_file};
+use crate::assets::Material;
+use crate::prefab::Prefab;
+
+mod accessor;
+pub(super) mod buffers;
+mod check;
+mod container;
+mod json;
+mod material;
+mod mesh;
+mod node;
+mod texture;
+
+use json::{Fault, Item};
+
+/// Reads a glTF file.
+pub(super) fn load(
+    path: &Path,
+    options: &ImportOptions,
+    progress: &dyn Fn(&str, f32),
+) -> Result<Imported, ImportError> {
+    let bytes = read_model_file(path)?;
+    let is_glb = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("glb"));
+    read(path, bytes, is_glb, options, progress)
+        .map_err(|fault| ImportError::new(path, fault.reason).at(fault.place))
+}
+
+fn read(
+    path: &Path,
+    bytes: Vec<u8>,
+    is_glb: bool,
+    options: &ImportOptions,
+    progress: &dyn Fn(&str, f32),
+) -> Result<Imported, Fault> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let container = container::read(&bytes, is_glb)?;
+    let root = Item::root(&container.json);
+    check::version(&root)?;
+    let left_out = check::extensions(&root)?;
+    let counts = check::references(&root)?;
+    progress("reading buffers", 0.1);
+    let buffers = buffers::Buffers::read(&root, bytes, container.binary, folder)?;
+    let views = accessor::views(&root, &buffers, &counts)?;
+    let accessors = accessor::Accessors::read(&root, &buffers, &views)?;
+    progress("reading meshes", 0.2);
+    let mut textures = texture::TextureTable::read(&root)?;
+    let mut materials = material::read_all(&root, &mut textures)?;
+    let meshes = mesh::read_all(&root, &accessors, &materials, options.max_elements)?;
+    if meshes.uses_default_material {
+        materials.push(Material { name: "default".to_owned(), ..Material::default() });
+    }
+    let tree = node::read_scene(&root, &accessors, &meshes.list)?;
+    progress("decoding images", 0.5);
+    let (textures, image_warnings) =
+        textures.load(&root, &buffers, &views, folder, options.max_image_extent_px)?;
+    let mut prefab = Prefab::new(file_stem(path), path);
+    prefab.environment = tree.environment;
+    prefab.set_nodes(tree.parts).map_err(|error| Fault::new("/nodes", error.to_string()))?;
+    let faults = left_out_warnings(&root, &left_out)?
+        .into_iter()
+        .chain(meshes.warnings)
+        .chain(tree.warnings)
+        .chain(image_warnings);
+    let warnings = faults
+        .map(|fault| Warning { file: path.to_owned(), place: fault.place, message: fault.reason })
+        .collect();
+    progress("done", 1.0);
+    Ok(Imported { prefab, meshes: meshes.list, materials, textures, warnings })
+}
+
+/// What the file has and the program does not show.
+fn left_out_warnings(root: &Item<'_>, extensions: &[String]) -> Result<Vec<Fault>, Fault> {
+    let mut warnings: Vec<Fault> = extensions
+        .iter()
+        .map(|name| Fault::new("/extensionsUsed", format!("{name} is not supported and is left out")))
+        .collect();
+    for (key, message) in [
+        ("animations", "animations are not played yet; the pose of the file is shown"),
+        ("skins", "skins are not bent yet; the meshes are shown in their own pose"),
+    ] {
+        if !root.items(key)?.is_empty() {
+            warnings.push(Fault::new(format!("/{key}"), message));
+        }
+    }
+    if root.extension("KHR_materials_variants")?.is_some() {
+        let message = "of the material variants the default one is shown";
+        warnings.push(Fault::new("/extensions/KHR_materials_variants", message));
+    }
+    Ok(warnings)
+}

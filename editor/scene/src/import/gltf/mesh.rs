@@ -1,0 +1,261 @@
+//! Meshes: accessors to attributes, any triangle topology to lists, then the mesh builder.
+//! In: JSON and checked accessors. Out: meshes and what was repaired. Points and lines are left out.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::super::geometry::{Attributes, MeshBuilder, PrimitiveInput, Repairs};
+use super::accessor::{Accessors, Component};
+use super::json::{Fault, Item};
+use crate::assets::{Material, Mesh};
+use crate::ids::MaterialId;
+
+/// All meshes, and whether a primitive asked for the default material.
+pub(super) struct Meshes {
+    pub list: Vec<Mesh>,
+    pub uses_default_material: bool,
+    pub warnings: Vec<Fault>,
+}
+
+/// Reads all meshes on all cores. A primitive without a material gets the one after the last.
+pub(super) fn read_all(
+    root: &Item<'_>,
+    accessors: &Accessors<'_>,
+    materials: &[Material],
+    max_elements: usize,
+) -> Result<Meshes, Fault> {
+    let items = root.objects("meshes")?;
+    let results: Vec<Result<OneMesh, Fault>> =
+        items.par_iter().map(|item| read(item, accessors, materials, max_elements)).collect();
+    let mut meshes =
+        Meshes { list: Vec::with_capacity(items.len()), uses_default_material: false, warnings: Vec::new() };
+    let mut elements = 0_usize;
+    for (result, item) in results.into_iter().zip(&items) {
+        let one = result?;
+        elements =
+            elements.saturating_add(one.mesh.data.positions.len()).saturating_add(one.mesh.triangle_count());
+        if elements > max_elements {
+            return Err(too_many(item, max_elements));
+        }
+        meshes.uses_default_material |= one.uses_default_material;
+        meshes.warnings.extend(one.warnings);
+        meshes.list.push(one.mesh);
+    }
+    Ok(meshes)
+}
+
+struct OneMesh {
+    mesh: Mesh,
+    uses_default_material: bool,
+    warnings: Vec<Fault>,
+}
+
+fn too_many(item: &Item<'_>, limit: usize) -> Fault {
+    item.fault(format!("more than {limit} vertices and triangles in one file are not read"))
+}
+
+fn read(
+    item: &Item<'_>,
+    accessors: &Accessors<'_>,
+    materials: &[Material],
+    max_elements: usize,
+) -> Result<OneMesh, Fault> {
+    let mut builder = MeshBuilder::default();
+    let mut cache = HashMap::new();
+    let mut warnings = Vec::new();
+    let mut uses_default_material = false;
+    let mut morphed = false;
+    let mut corners = 0_usize;
+    for primitive in item.objects("primitives")? {
+        morphed |= !primitive.items("targets")?.is_empty();
+        let mode = primitive.size("mode")?.unwrap_or(4);
+        if mode > 6 {
+            return Err(primitive.fault(format!("mode {mode} does not exist")));
+        }
+        if mode < 4 {
+            warnings.push(primitive.fault("points and lines are not shown; it was left out"));
+            continue;
+        }
+        let Some(attributes) = read_attributes(&primitive, accessors, &mut cache)? else {
+            warnings.push(primitive.fault("it has no POSITION; it was left out"));
+            continue;
+        };
+        let indices = read_triangles(&primitive, accessors, mode, attributes.positions.len())?;
+        corners = corners.saturating_add(indices.len());
+        if corners / 3 > max_elements {
+            return Err(too_many(&primitive, max_elements));
+        }
+        let material = primitive.index("material", materials.len(), "material")?;
+        uses_default_material |= material.is_none();
+        let normal_map = material.and_then(|m| materials.get(m)).and_then(|m| m.normal_texture.as_ref());
+        let input = PrimitiveInput {
+            attributes: &attributes,
+            indices,
+            material: MaterialId(material.unwrap_or(materials.len()) as u64),
+            normal_map_tex_coord: normal_map.map(|texture_use| texture_use.tex_coord),
+        };
+        let added = builder
+            .add(input)
+            .map_err(|_| primitive.fault("the mesh has more vertices than 32 bits can count"))?;
+        if !added {
+            warnings.push(primitive.fault("no triangle with an area is left; it was left out"));
+        }
+    }
+    warnings.extend(repair_warnings(item, &builder.repairs));
+    if morphed {
+        warnings.push(item.fault("morph targets are not animated yet; the base shape is shown"));
+    }
+    Ok(OneMesh { mesh: builder.finish(item.name()?), uses_default_material, warnings })
+}
+
+fn repair_warnings(item: &Item<'_>, repairs: &Repairs) -> Vec<Fault> {
+    let lines = [
+        (repairs.degenerate_triangles, "triangles without area were removed"),
+        (repairs.non_finite_triangles, "triangles with positions that are not finite were removed"),
+        (repairs.non_finite_values, "texture coordinates or colours were not finite and were replaced"),
+        (repairs.replaced_normals, "normals had no direction and were replaced by those of their triangles"),
+    ];
+    lines
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| item.fault(format!("{count} {what}")))
+        .collect()
+}
+
+/// The attributes of a primitive; primitives that name the same accessors share them.
+fn read_attributes(
+    primitive: &Item<'_>,
+    accessors: &Accessors<'_>,
+    cache: &mut HashMap<Vec<(&'static str, usize)>, Arc<Attributes>>,
+) -> Result<Option<Arc<Attributes>>, Fault> {
+    const READ: [&str; 6] = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"];
+    let Some(item) = primitive.child("attributes")? else {
+        return Ok(None);
+    };
+    let mut key = Vec::new();
+    for name in READ {
+        if let Some(index) = item.size(name)? {
+            key.push((name, index));
+        }
+    }
+    if key.first().map(|(name, _)| *name) != Some("POSITION") {
+        return Ok(None);
+    }
+    let draco = primitive.extension("KHR_draco_mesh_compression")?.is_some();
+    if let Some(&(_, position)) = key.first().filter(|_| draco)
+        && !accessors.get(position)?.has_data()
+    {
+        let reason = "its vertices are compressed with KHR_draco_mesh_compression, which is not read yet";
+        return Err(primitive.fault(reason));
+    }
+    if let Some(cached) = cache.get(&key) {
+        return Ok(Some(Arc::clone(cached)));
+    }
+    let mut attributes = Attributes::default();
+    let mut count = None;
+    for &(name, index) in &key {
+        let accessor = accessors.get(index)?;
+        let count = *count.get_or_insert(accessor.count);
+        let widths: &[usize] = match name {
+            "POSITION" | "NORMAL" => &[3],
+            "TANGENT" => &[4],
+            "COLOR_0" => &[3, 4],
+            _ => &[2],
+        };
+        let fault = |reason| Fault::new(format!("{}/{name}", item.place()), reason);
+        if accessor.is_matrix || !widths.contains(&accessor.width) {
+            return Err(fault(format!("accessor {index} has the wrong type")));
+        }
+        if accessor.component == Component::U32 {
+            return Err(fault(format!("accessor {index} has 32-bit integers")));
+        }
+        if accessor.count != count {
+            return Err(fault(format!("it has {} elements, POSITION has {count}", accessor.count)));
+        }
+        match name {
+            "POSITION" => attributes.positions = vec3s(accessors, index)?,
+            "NORMAL" => attributes.normals = Some(vec3s(accessors, index)?),
+            "TANGENT" => attributes.tangents = Some(vec4s(accessors, index)?),
+            "TEXCOORD_0" => attributes.tex_coords0 = Some(vec2s(accessors, index)?),
+            "TEXCOORD_1" => attributes.tex_coords1 = Some(vec2s(accessors, index)?),
+            _ => attributes.colors = Some(vec4s(accessors, index)?),
+        }
+    }
+    let attributes = Arc::new(attributes);
+    cache.insert(key, Arc::clone(&attributes));
+    Ok(Some(attributes))
+}
+
+fn vec2s(accessors: &Accessors<'_>, index: usize) -> Result<Vec<Vec2>, Fault> {
+    let values = accessors.floats::<2>(index, 0.0)?;
+    Ok(values.into_iter().map(Vec2::from).collect())
+}
+
+fn vec3s(accessors: &Accessors<'_>, index: usize) -> Result<Vec<Vec3>, Fault> {
+    let values = accessors.floats::<3>(index, 0.0)?;
+    Ok(values.into_iter().map(Vec3::from).collect())
+}
+
+fn vec4s(accessors: &Accessors<'_>, index: usize) -> Result<Vec<Vec4>, Fault> {
+    let values = accessors.floats::<4>(index, 1.0)?;
+    Ok(values.into_iter().map(Vec4::from).collect())
+}
+
+/// Three checked indices a triangle, from lists, strips and fans, indexed or not.
+fn read_triangles(
+    primitive: &Item<'_>,
+    accessors: &Accessors<'_>,
+    mode: usize,
+    vertex_count: usize,
+) -> Result<Vec<u32>, Fault> {
+    let count = u32::try_from(vertex_count)
+        .map_err(|_| primitive.fault("it has more vertices than 32 bits can count"))?;
+    let order = match primitive.size("indices")? {
+        Some(index) => accessors.indices(index)?,
+        None => (0..count).collect(),
+    };
+    if let Some(bad) = order.iter().find(|&&index| index >= count) {
+        return Err(Fault::new(
+            format!("{}/indices", primitive.place()),
+            format!("vertex index {bad} is out of range, there are {count} vertices"),
+        ));
+    }
+    Ok(match mode {
+        5 => strip(&order),
+        6 => fan(&order),
+        _ => {
+            let mut list = order;
+            list.truncate(list.len() / 3 * 3);
+            list
+        }
+    })
+}
+
+/// Every second triangle is turned, so that all face the same way (glTF 2.0, section 3.7.2.1).
+fn strip(order: &[u32]) -> Vec<u32> {
+    let triangles = order.array_windows::<3>().enumerate();
+    triangles.flat_map(|(i, &[a, b, c])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] }).collect()
+}
+
+fn fan(order: &[u32]) -> Vec<u32> {
+    let Some((&hub, rim)) = order.split_first() else {
+        return Vec::new();
+    };
+    rim.array_windows::<2>().flat_map(|&[a, b]| [a, b, hub]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_and_fans_keep_their_facing() {
+        assert_eq!(strip(&[0, 1, 2, 3, 4]), [0, 1, 2, 1, 3, 2, 2, 3, 4]);
+        assert_eq!(fan(&[0, 1, 2, 3]), [1, 2, 0, 2, 3, 0]);
+        assert!(strip(&[0, 1]).is_empty());
+        assert!(fan(&[]).is_empty());
+    }
+}

@@ -1,0 +1,58 @@
+//! Images of materials: PNG and JPEG to 8-bit RGBA, with limits, and the checker that stands in for a bad one.
+//! In: bytes. Out: texels, first row at the top, colours as encoded in the file.
+
+use std::io::Cursor;
+use std::sync::Arc;
+
+use image::{ImageFormat, ImageReader, Limits};
+
+/// Side of the stand-in image in texels, and of its squares.
+const CHECKER_PX: u32 = 16;
+const CHECKER_SQUARE_PX: u32 = 4;
+
+/// Texels of an image.
+#[derive(Clone, Debug)]
+pub(super) struct Pixels {
+    pub width: u32,
+    pub height: u32,
+    pub rgba8: Arc<[u8]>,
+    pub placeholder: bool,
+}
+
+/// Decodes a PNG or JPEG; deeper channels are reduced to 8 bits.
+pub(super) fn decode(bytes: &[u8], max_extent_px: u32) -> Result<Pixels, String> {
+    let mut reader =
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+    match reader.format() {
+        Some(ImageFormat::Png | ImageFormat::Jpeg) => {}
+        Some(other) => return Err(format!("{other:?} images are not supported here")),
+        None => return Err("it is neither PNG nor JPEG".to_owned()),
+    }
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(max_extent_px);
+    limits.max_image_height = Some(max_extent_px);
+    // Decoded at up to 16 bits a channel, with room for the decoder's own copy.
+    limits.max_alloc = Some(u64::from(max_extent_px).pow(2) * 16);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|error| error.to_string())?;
+    let image = image.into_rgba8();
+    let (width, height) = image.dimensions();
+    if width == 0 || height == 0 {
+        return Err("it has no texels".to_owned());
+    }
+    Ok(Pixels { width, height, rgba8: image.into_raw().into(), placeholder: false })
+}
+
+/// A checker in magenta and black, seen at once.
+pub(super) fn placeholder() -> Pixels {
+    let texel = |i: u32| {
+        let square = (i % CHECKER_PX / CHECKER_SQUARE_PX) + (i / CHECKER_PX / CHECKER_SQUARE_PX);
+        if square.is_multiple_of(2) { [255, 0, 255, 255] } else { [0, 0, 0, 255] }
+    };
+    Pixels {
+        width: CHECKER_PX,
+        height: CHECKER_PX,
+        rgba8: (0..CHECKER_PX * CHECKER_PX).flat_map(texel).collect(),
+        placeholder: true,
+    }
+}

@@ -1,0 +1,145 @@
+//! URIs inside a model file: data URIs are decoded, relative ones become paths below the model's folder.
+//! It refuses everything that reaches above that folder or names a host, in words.
+
+use std::path::{Path, PathBuf};
+
+use percent_encoding::percent_decode_str;
+
+/// Where the bytes of a URI are.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Location {
+    /// In the URI itself.
+    Data(Vec<u8>),
+    /// In a file.
+    File(PathBuf),
+}
+
+/// Finds out where the bytes of a URI are; `folder` is that of the model.
+pub(super) fn resolve(uri: &str, folder: &Path) -> Result<Location, String> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        return decode_data(data).map(Location::Data);
+    }
+    if let Some((scheme, _)) = uri.split_once(':')
+        && scheme.len() > 1
+        && is_scheme(scheme)
+    {
+        return Err(format!("\"{uri}\" names a {scheme} address; only files beside the model are read"));
+    }
+    let decoded = percent_decode_str(uri)
+        .decode_utf8()
+        .map_err(|_| format!("\"{uri}\" is not UTF-8 after percent decoding"))?;
+    beside(&decoded, folder).map(Location::File)
+}
+
+/// A path as written in a file, relative to `folder` and not above it.
+pub(super) fn beside(name: &str, folder: &Path) -> Result<PathBuf, String> {
+    if name.is_empty() || name.contains('\0') {
+        return Err("the file name is empty or holds a zero byte".to_owned());
+    }
+    let name = name.replace('\\', "/");
+    let drive = name.as_bytes().get(1) == Some(&b':');
+    if name.starts_with('/') || drive {
+        return Err(format!("\"{name}\" is an absolute path; only files beside the model are read"));
+    }
+    let mut parts: Vec<&str> = Vec::new();
+    for part in name.split('/') {
+        match part {
+            "" | "." => {}
+            ".." => {
+                if parts.pop().is_none() {
+                    return Err(format!(
+                        "\"{name}\" reaches above the folder of the model, which is not allowed"
+                    ));
+                }
+            }
+            part => parts.push(part),
+        }
+    }
+    Ok(parts.iter().fold(folder.to_owned(), |path, part| path.join(part)))
+}
+
+fn is_scheme(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_alphabetic())
+        && text.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.'))
+}
+
+fn decode_data(data: &str) -> Result<Vec<u8>, String> {
+    let (header, body) = data.split_once(',').ok_or("the data URI has no comma and so no data")?;
+    let body: Vec<u8> = percent_decode_str(body).collect();
+    if header.ends_with(";base64") { decode_base64(&body) } else { Ok(body) }
+}
+
+/// RFC 4648, section 4; padding may be missing, white space is skipped.
+fn decode_base64(text: &[u8]) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
+    let (mut bits, mut count, mut padding) = (0_u32, 0_u32, 0);
+    for &byte in text {
+        let value = match byte {
+            b'A'..=b'Z' => byte - b'A',
+            b'a'..=b'z' => byte - b'a' + 26,
+            b'0'..=b'9' => byte - b'0' + 52,
+            b'+' | b'-' => 62,
+            b'/' | b'_' => 63,
+            b'=' => {
+                padding += 1;
+                continue;
+            }
+            b' ' | b'\t' | b'\r' | b'\n' => continue,
+            _ => return Err("the data URI is not base64".to_owned()),
+        };
+        if padding > 0 {
+            return Err("the data URI goes on after its padding".to_owned());
+        }
+        bits = (bits << 6) | u32::from(value);
+        count += 6;
+        if count >= 8 {
+            count -= 8;
+            bytes.push((bits >> count) as u8);
+            bits &= (1 << count) - 1;
+        }
+    }
+    // Six left-over bits are a lone character, which encodes no byte.
+    if count >= 6 || padding > 2 {
+        return Err("the data URI ends in the middle of a byte".to_owned());
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64() {
+        assert_eq!(decode_base64(b"aGVsbG8="), Ok(b"hello".to_vec()));
+        assert_eq!(decode_base64(b"aGVsbG8"), Ok(b"hello".to_vec()));
+        assert_eq!(decode_base64(b""), Ok(vec![]));
+        assert!(decode_base64(b"a").is_err());
+        assert!(decode_base64(b"a?==").is_err());
+        assert!(decode_base64(b"aG=s").is_err());
+    }
+
+    #[test]
+    fn paths_stay_beside_the_model() {
+        let folder = Path::new("models");
+        let file = |uri| resolve(uri, folder);
+        assert_eq!(file("tex/a%20b.png"), Ok(Location::File("models/tex/a b.png".into())));
+        assert_eq!(file("x/../b.png"), Ok(Location::File("models/b.png".into())));
+        for bad in [
+            "../a.png",
+            "x/../../a.png",
+            "/etc/passwd",
+            "%2Fetc/passwd",
+            "%2e%2e/a.png",
+            "..\\a.png",
+            "http://host/a.png",
+            "file:///a.png",
+            "C:/a.png",
+            "//host/a.png",
+            "",
+            "a%00b",
+        ] {
+            assert!(file(bad).is_err(), "{bad}");
+        }
+    }
+}

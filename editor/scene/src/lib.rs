@@ -1,0 +1,31 @@
+//! The scene model of Caustica: documents, edits, import, projects.
+//! In: files and edits. Out: a [`Document`] with double-precision transforms and a [`ChangeSet`] of what changed.
+//! It knows no window and no device, and it does not know the renderer.
+
+mod assets;
+mod audit;
+mod changes;
+mod document;
+mod edit;
+mod ids;
+pub mod import;
+mod node;
+mod package;
+mod prefab;
+mod project;
+mod transform;
+
+pub use assets::{
+    AlphaMode, Camera, Environment, EnvironmentFile, Light, LightKind, Material, Mesh, MeshData, Primitive,
+    Projection, RadianceMap, Sampler, ShadingMode, Texture, TextureUse, Wrap,
+};
+pub use audit::{Finding, Severity, Subject, audit};
+pub use changes::{ChangeSet, Content};
+pub use document::{Document, Placed, Renderable};
+pub use edit::{Edit, EditError, OverrideField};
+pub use ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
+pub use node::{Node, NodeKind, Subtree};
+pub use package::{MaterialEntry, PrefabPackage};
+pub use prefab::{PartNode, PartOrderError, PartOverride, PartPath, Prefab};
+pub use project::{Project, ProjectError, ProjectMeta, ProjectProblem, SCHEMA_VERSION};
+pub use transform::{Local, Trs, is_degenerate, rigid};

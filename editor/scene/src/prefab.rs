@@ -1,0 +1,210 @@
+//! A prefab: the node tree of one imported file, flat and in depth-first order.
+//! Instances in the document refer to it and lay overrides over its parts, keyed by [`PartPath`].
+//! It knows neither the document nor the format of its file.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::assets::{Camera, Environment, Light};
+use crate::ids::{MaterialId, MeshId, TextureId};
+use crate::transform::Local;
+
+/// One node of an imported file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PartNode {
+    /// Name in the file; may be empty.
+    pub name: String,
+    /// Index of the parent in the same list; `None`: a root. Parents come before children.
+    pub parent: Option<u32>,
+    /// Transform against the parent.
+    pub local: Local,
+    /// False: hidden in the file.
+    pub visible: bool,
+    /// The mesh it places.
+    pub mesh: Option<MeshId>,
+    /// The light it carries.
+    pub light: Option<Light>,
+    /// The camera it carries.
+    pub camera: Option<Camera>,
+}
+
+/// Where a part stands in its source: names from the root, joined by `/`. The n-th further sibling of
+/// the same name is marked `#n`; `/`, `#` and `%` inside names are percent-encoded. Reordering
+/// differently named siblings, and adding nodes, leave the paths of the others as they were.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct PartPath(pub String);
+
+impl fmt::Display for PartPath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// What an instance says differently from its prefab about one part; `None` follows the prefab.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PartOverride {
+    /// Name.
+    pub name: Option<String>,
+    /// Transform against the parent part.
+    pub local: Option<Local>,
+    /// Visibility.
+    pub visible: Option<bool>,
+    /// Materials by index of the primitive.
+    pub materials: BTreeMap<u32, MaterialId>,
+    /// The light's values; only where the source has a light.
+    pub light: Option<Light>,
+    /// The camera's values; only where the source has a camera.
+    pub camera: Option<Camera>,
+}
+
+impl PartOverride {
+    /// Whether nothing differs from the prefab.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// An imported file in the document.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Prefab {
+    /// Shown in the outliner.
+    pub name: String,
+    /// The file it came from.
+    pub source: PathBuf,
+    /// Its meshes in the order of the file.
+    pub meshes: Vec<MeshId>,
+    /// Its materials in the order of the file.
+    pub materials: Vec<MaterialId>,
+    /// Its textures in the order of import.
+    pub textures: Vec<TextureId>,
+    /// The environment that the file asks for.
+    pub environment: Option<Environment>,
+    /// True: the file could not be read; the prefab stands for it so that nothing is lost on save.
+    pub missing: bool,
+    nodes: Vec<PartNode>,
+    subtree_end: Vec<u32>,
+    segments: Vec<String>,
+}
+
+/// Why a list of parts is not a tree in depth-first order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("part {part} does not follow its parent in depth-first order")]
+pub struct PartOrderError {
+    /// Index of the part at fault.
+    pub part: usize,
+}
+
+impl Prefab {
+    /// A prefab without parts.
+    pub fn new(name: impl Into<String>, source: impl Into<PathBuf>) -> Self {
+        Self { name: name.into(), source: source.into(), ..Self::default() }
+    }
+
+    /// The parts, parents before children, every subtree in one run.
+    pub fn nodes(&self) -> &[PartNode] {
+        &self.nodes
+    }
+
+    /// Part by index.
+    pub fn node(&self, part: u32) -> Option<&PartNode> {
+        self.nodes.get(part as usize)
+    }
+
+    /// Replaces the parts.
+    ///
+    /// # Errors
+    /// When the list is not in depth-first order.
+    pub fn set_nodes(&mut self, nodes: Vec<PartNode>) -> Result<(), PartOrderError> {
+        self.subtree_end = subtree_ends(&nodes)?;
+        self.segments = path_segments(&nodes);
+        self.nodes = nodes;
+        Ok(())
+    }
+
+    /// Puts other mesh ids in place.
+    pub(crate) fn map_meshes(&mut self, map: impl Fn(MeshId) -> MeshId) {
+        for mesh in self.nodes.iter_mut().filter_map(|node| node.mesh.as_mut()) {
+            *mesh = map(*mesh);
+        }
+    }
+
+    /// One past the last part of the subtree of `part`, which is the run `part..end`.
+    pub fn subtree_end(&self, part: u32) -> u32 {
+        self.subtree_end.get(part as usize).copied().unwrap_or(part.saturating_add(1))
+    }
+
+    /// Children of a part, or the roots for `None`, in order.
+    pub fn children(&self, parent: Option<u32>) -> impl Iterator<Item = u32> + '_ {
+        let (first, end) = match parent {
+            Some(part) => (part.saturating_add(1), self.subtree_end(part)),
+            None => (0, self.nodes.len() as u32),
+        };
+        std::iter::successors((first < end).then_some(first), move |&child| {
+            let next = self.subtree_end(child);
+            (next < end).then_some(next)
+        })
+    }
+
+    /// The path of a part in its source.
+    pub fn path_of(&self, part: u32) -> Option<PartPath> {
+        let mut names = Vec::new();
+        let mut at = Some(part);
+        while let Some(index) = at {
+            names.push(self.segments.get(index as usize)?.as_str());
+            at = self.nodes.get(index as usize)?.parent;
+        }
+        names.reverse();
+        Some(PartPath(names.join("/")))
+    }
+
+    /// The part at a path, if the source still has it.
+    pub fn part_at(&self, path: &PartPath) -> Option<u32> {
+        let mut at = None;
+        for segment in path.0.split('/') {
+            at = Some(
+                self.children(at).find(|&c| self.segments.get(c as usize).is_some_and(|s| s == segment))?,
+            );
+        }
+        at
+    }
+}
+
+fn subtree_ends(nodes: &[PartNode]) -> Result<Vec<u32>, PartOrderError> {
+    let mut ends: Vec<u32> = (1..=nodes.len() as u32).collect();
+    let mut open: Vec<u32> = Vec::new();
+    for (part, node) in nodes.iter().enumerate() {
+        while open.last().copied() != node.parent {
+            let Some(closed) = open.pop() else {
+                return Err(PartOrderError { part });
+            };
+            if let Some(end) = ends.get_mut(closed as usize) {
+                *end = part as u32;
+            }
+        }
+        open.push(part as u32);
+    }
+    for still_open in open {
+        if let Some(end) = ends.get_mut(still_open as usize) {
+            *end = nodes.len() as u32;
+        }
+    }
+    Ok(ends)
+}
+
+fn path_segments(nodes: &[PartNode]) -> Vec<String> {
+    let mut seen: HashMap<(Option<u32>, &str), u32> = HashMap::new();
+    nodes
+        .iter()
+        .map(|node| {
+            let count = seen.entry((node.parent, node.name.as_str())).or_insert(0);
+            let nth = *count;
+            *count += 1;
+            let name = node.name.replace('%', "%25").replace('/', "%2F").replace('#', "%23");
+            if nth == 0 { name } else { format!("{name}#{nth}") }
+        })
+        .collect()
+}

@@ -1,0 +1,133 @@
+//! Projects: a versioned JSON file that names its prefabs by path and holds what was edited.
+//! In: a path, or a document to save. Out: a document, what the program keeps beside it, and warnings.
+//! It refuses newer versions in words, keeps what it does not know, and never leaves half a file.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value};
+
+use crate::document::Document;
+use crate::import::{ImportOptions, Warning};
+
+mod atomic;
+mod paths;
+mod read;
+mod record;
+mod write;
+
+/// Version of the format that is written, and the newest that is read.
+pub const SCHEMA_VERSION: u64 = 1;
+
+/// A project that was read.
+#[derive(Clone, Debug)]
+pub struct Project {
+    /// The scene.
+    pub document: Document,
+    /// What else is in the file.
+    pub meta: ProjectMeta,
+    /// What is missing or was repaired.
+    pub warnings: Vec<Warning>,
+}
+
+/// What a project file holds beside the document. Hand the same one back when saving.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ProjectMeta {
+    /// Settings of the views; the editor's own.
+    pub view: Map<String, Value>,
+    /// Settings of the renderer; the editor's own.
+    pub render: Map<String, Value>,
+    kept: Kept,
+}
+
+/// What this version does not know or cannot place, kept for the next save.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Kept {
+    top: Map<String, Value>,
+    nodes: BTreeMap<u64, Map<String, Value>>,
+    prefabs: BTreeMap<u64, Map<String, Value>>,
+    materials: BTreeMap<u64, Map<String, Value>>,
+    /// Moved primitives of meshes that are missing now, as they were in the file.
+    meshes: Vec<record::MeshRecord>,
+    /// The chosen camera when the part that it names is missing now.
+    camera: Option<record::CameraRecord>,
+}
+
+/// Why a project cannot be read or saved.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {problem}", file.display())]
+pub struct ProjectError {
+    /// The project file.
+    pub file: PathBuf,
+    /// What is wrong.
+    #[source]
+    pub problem: ProjectProblem,
+}
+
+/// What is wrong with a project.
+#[derive(Debug, thiserror::Error)]
+pub enum ProjectProblem {
+    /// The file system said no.
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    /// Not JSON, or a field has the wrong type.
+    #[error("not a valid project: {0}")]
+    Json(#[from] serde_json::Error),
+    /// There is no version in it.
+    #[error("not a Caustica project: the field \"caustica\" with the version is missing")]
+    NotAProject,
+    /// A later version of the program wrote it.
+    #[error(
+        "written by a newer version of Caustica (format {found}, this program reads up to {SCHEMA_VERSION}); \
+         please update the program"
+    )]
+    Newer {
+        /// Version in the file.
+        found: u64,
+    },
+    /// The contents contradict each other.
+    #[error("{0}")]
+    Broken(String),
+}
+
+impl Project {
+    /// Whether a path is named like a project: `.caustica` or `.json`.
+    pub fn is_project_path(path: &Path) -> bool {
+        path.extension().is_some_and(|extension| {
+            extension.eq_ignore_ascii_case("caustica") || extension.eq_ignore_ascii_case("json")
+        })
+    }
+
+    /// Reads a project and imports its prefabs. One whose file is missing or bad becomes a placeholder, with
+    /// a warning, and is kept on save.
+    ///
+    /// # Errors
+    /// When the project file itself cannot be read, is no project or is too new.
+    pub fn load(path: &Path) -> Result<Self, ProjectError> {
+        Self::load_with_progress(path, &ImportOptions::default(), &|_, _| {})
+    }
+
+    /// Like [`Self::load`]; `progress` is called with the name of what is read and the share done, 0..1.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_progress(
+        path: &Path,
+        options: &ImportOptions,
+        progress: &dyn Fn(&str, f32),
+    ) -> Result<Self, ProjectError> {
+        read::load(path, options, progress).map_err(|problem| ProjectError { file: path.to_owned(), problem })
+    }
+
+    /// Writes a project: whole or not at all; the file that was there before goes on as `<name>.bak`.
+    /// The same document and meta give the same bytes.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn save(path: &Path, document: &Document, meta: &ProjectMeta) -> Result<(), ProjectError> {
+        write::to_text(path, document, meta)
+            .map_err(ProjectProblem::from)
+            .and_then(|text| Ok(atomic::write(path, text.as_bytes())?))
+            .map_err(|problem| ProjectError { file: path.to_owned(), problem })
+    }
+}

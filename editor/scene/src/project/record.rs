@@ -1,0 +1,274 @@
+//! What stands in a project file, field by field. Each record keeps the fields that it does not know.
+//! Knows JSON and the values of the document, not the document.
+
+use std::collections::BTreeMap;
+
+use glam::{DAffine3, DQuat, DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::assets::{Camera, Light, Material};
+use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, TextureId};
+use crate::prefab::{PartOverride, PartPath};
+use crate::transform::{Local, Trs};
+
+/// The whole file.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct ProjectRecord {
+    /// Version of the format.
+    pub caustica: u64,
+    #[serde(default)]
+    pub next_id: u64,
+    #[serde(default)]
+    pub prefabs: Vec<PrefabRecord>,
+    /// Edited materials of prefabs, and materials made in the program.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<MaterialRecord>,
+    /// Meshes with moved primitives.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub meshes: Vec<MeshRecord>,
+    /// Parents before children, siblings in order.
+    #[serde(default)]
+    pub nodes: Vec<NodeRecord>,
+    #[serde(default)]
+    pub environment: EnvironmentRecord,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraRecord>,
+    #[serde(default)]
+    pub view: Map<String, Value>,
+    #[serde(default)]
+    pub render: Map<String, Value>,
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+impl ProjectRecord {
+    /// The largest id that anything in the file has.
+    pub fn largest_id(&self) -> u64 {
+        let prefabs = self.prefabs.iter().flat_map(|prefab| {
+            let meshes = prefab.meshes.iter().map(|id| id.0);
+            let materials = prefab.materials.iter().map(|id| id.0);
+            let textures = prefab.textures.iter().map(|id| id.0);
+            meshes.chain(materials).chain(textures).chain([prefab.id.0])
+        });
+        let materials = self.materials.iter().map(|material| material.id.0);
+        let nodes = self.nodes.iter().map(|node| node.id.0);
+        prefabs.chain(materials).chain(nodes).max().unwrap_or(0)
+    }
+}
+
+/// A prefab: its file and the ids of what it brings, in the order of the file.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct PrefabRecord {
+    pub id: PrefabId,
+    pub name: String,
+    /// Relative to the project, with forward slashes.
+    pub source: String,
+    #[serde(default)]
+    pub meshes: Vec<MeshId>,
+    #[serde(default)]
+    pub materials: Vec<MaterialId>,
+    #[serde(default)]
+    pub textures: Vec<TextureId>,
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct MaterialRecord {
+    pub id: MaterialId,
+    pub value: Material,
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+/// The primitives of a mesh that were moved: index to `mesh_from_primitive`, column by column.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct MeshRecord {
+    pub id: MeshId,
+    pub primitives: BTreeMap<u32, [f64; 12]>,
+}
+
+/// The chosen camera: a node, or a part of the instance by its path.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct CameraRecord {
+    pub node: NodeId,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<PartPath>,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "camelCase")]
+pub(super) enum EnvironmentRecord {
+    #[default]
+    Auto,
+    Sky,
+    Constant {
+        radiance: Vec3,
+    },
+    #[serde(rename_all = "camelCase")]
+    File {
+        path: String,
+        #[serde(default)]
+        rotation_rad: f32,
+        #[serde(default = "one")]
+        scale: f32,
+    },
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn is_true(value: &bool) -> bool {
+    *value
+}
+
+/// A node; which of `prefab`, `mesh`, `light` and `camera` is there says what it is, none: a group.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct NodeRecord {
+    pub id: NodeId,
+    pub name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<NodeId>,
+    #[serde(default, skip_serializing_if = "LocalRecord::is_identity")]
+    pub local: LocalRecord,
+    #[serde(default = "yes", skip_serializing_if = "is_true")]
+    pub visible: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prefab: Option<PrefabId>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub overrides: BTreeMap<PartPath, OverrideRecord>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<MeshId>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<MaterialId>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<Light>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Camera>,
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+/// A matrix, column by column, or translation, rotation (x, y, z, w) and scale.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct LocalRecord {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matrix: Option<[f64; 12]>,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub translation: DVec3,
+    #[serde(default = "unturned", skip_serializing_if = "is_unturned")]
+    pub rotation: DQuat,
+    #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
+    pub scale: DVec3,
+}
+
+fn unturned() -> DQuat {
+    DQuat::IDENTITY
+}
+
+fn unscaled() -> DVec3 {
+    DVec3::ONE
+}
+
+// Negative zeros are written, so that what is read is the same to the bit.
+fn is_zero(value: &DVec3) -> bool {
+    value.to_array().map(f64::to_bits) == [0; 3]
+}
+
+fn is_unturned(value: &DQuat) -> bool {
+    value.to_array().map(f64::to_bits) == DQuat::IDENTITY.to_array().map(f64::to_bits)
+}
+
+fn is_unscaled(value: &DVec3) -> bool {
+    *value == DVec3::ONE
+}
+
+impl Default for LocalRecord {
+    fn default() -> Self {
+        Local::default().into()
+    }
+}
+
+impl LocalRecord {
+    fn is_identity(&self) -> bool {
+        self.matrix.is_none()
+            && is_zero(&self.translation)
+            && is_unturned(&self.rotation)
+            && is_unscaled(&self.scale)
+    }
+}
+
+impl From<Local> for LocalRecord {
+    fn from(local: Local) -> Self {
+        let (trs, matrix) = match local {
+            Local::Trs(trs) => (trs, None),
+            Local::Matrix(matrix) => (Trs::IDENTITY, Some(matrix.to_cols_array())),
+        };
+        Self { matrix, translation: trs.translation, rotation: trs.rotation, scale: trs.scale }
+    }
+}
+
+impl From<LocalRecord> for Local {
+    fn from(record: LocalRecord) -> Self {
+        match record.matrix {
+            Some(columns) => Self::Matrix(DAffine3::from_cols_array(&columns)),
+            None => Self::Trs(Trs {
+                translation: record.translation,
+                rotation: record.rotation,
+                scale: record.scale,
+            }),
+        }
+    }
+}
+
+/// What an instance says differently about a part.
+#[derive(Serialize, Deserialize)]
+pub(super) struct OverrideRecord {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub local: Option<LocalRecord>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub visible: Option<bool>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub materials: BTreeMap<u32, MaterialId>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<Light>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Camera>,
+}
+
+impl From<PartOverride> for OverrideRecord {
+    fn from(value: PartOverride) -> Self {
+        Self {
+            name: value.name,
+            local: value.local.map(LocalRecord::from),
+            visible: value.visible,
+            materials: value.materials,
+            light: value.light,
+            camera: value.camera,
+        }
+    }
+}
+
+impl From<OverrideRecord> for PartOverride {
+    fn from(record: OverrideRecord) -> Self {
+        Self {
+            name: record.name,
+            local: record.local.map(Local::from),
+            visible: record.visible,
+            materials: record.materials,
+            light: record.light,
+            camera: record.camera,
+        }
+    }
+}

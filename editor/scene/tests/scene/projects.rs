@@ -1,0 +1,185 @@
+//! Projects: what is saved comes back equal, the bytes are the same every time, nothing is lost.
+
+use crate::common::{ARM, LAMP, PLATE, Scene, scene, trs};
+use caustica_scene::{
+    Edit, Environment, Local, Material, MaterialEntry, MaterialId, Project, ProjectMeta, ProjectProblem,
+    Target, Trs,
+};
+use glam::{DAffine3, DVec3, Vec3};
+use serde_json::{Value, json};
+
+/// A scene with every kind of thing that a project keeps.
+fn edited(folder: &std::path::Path) -> Scene {
+    let mut scene = scene(folder);
+    let mut shear = DAffine3::from_translation(DVec3::new(0.1 + 0.2, -0.0, 1e300));
+    shear.matrix3.y_axis.x = 0.3;
+    let (mesh, _) = scene.document.meshes().next().unwrap();
+    let materials: Vec<MaterialId> = scene.document.materials().map(|(id, _)| id).collect();
+    let own = MaterialId(scene.document.allocate_id());
+    let changed = Material {
+        roughness: 0.1,
+        emissive: Vec3::new(0.1, 0.2, 0.3),
+        ..scene.document.material(materials[1]).unwrap().clone()
+    };
+    let entry = MaterialEntry { value: Material::default(), original: None };
+    let (plate, lamp) = (scene.part(PLATE), scene.part(LAMP));
+    let mut lamp_light = scene.document.light_of(lamp).unwrap();
+    lamp_light.intensity = 3.5;
+    for edit in [
+        Edit::SetTransform { target: scene.second.into(), local: Local::Matrix(shear) },
+        Edit::SetTransform { target: plate, local: trs(0.1, 0.7, 3.0) },
+        Edit::SetVisible { target: scene.part(ARM), visible: false },
+        Edit::AddMaterial { material: own, entry: Box::new(entry) },
+        Edit::AssignMaterial { target: plate, primitive: 1, material: own },
+        Edit::SetMaterial { material: materials[1], value: Box::new(changed) },
+        Edit::SetLight { target: lamp, light: lamp_light },
+        Edit::SetPrimitiveTransform {
+            mesh,
+            primitive: 1,
+            mesh_from_primitive: DAffine3::from_translation(DVec3::Y),
+        },
+        Edit::SetEnvironment(Environment::Constant(Vec3::new(0.1, 0.2, 0.3))),
+        Edit::SetDefaultCamera(Some(plate)),
+    ] {
+        scene.document.apply(edit).unwrap();
+    }
+    scene
+}
+
+fn meta() -> ProjectMeta {
+    let mut meta = ProjectMeta::default();
+    meta.view.insert("exposure".into(), json!(1.5));
+    meta.render.insert("z".into(), json!({"b": 1, "a": [1, 2]}));
+    meta
+}
+
+#[test]
+fn a_saved_project_comes_back_equal_and_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = edited(folder.path());
+    let path = folder.path().join("scene.caustica");
+    Project::save(&path, &scene.document, &meta()).unwrap();
+    let first = std::fs::read(&path).unwrap();
+    let project = Project::load(&path).unwrap();
+    assert!(project.warnings.is_empty(), "{:?}", project.warnings);
+    assert!(project.document == scene.document);
+    assert_eq!(project.meta, meta());
+    assert_eq!(project.document.next_id(), scene.document.next_id());
+    Project::save(&path, &project.document, &project.meta).unwrap();
+    let second = std::fs::read(&path).unwrap();
+    assert_eq!(String::from_utf8(first), String::from_utf8(second));
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("\"source\": \"model.gltf\""), "{text}");
+    // Single precision is written short.
+    assert!(text.contains("0.1,") && !text.contains("0.10000000149"), "{text}");
+}
+
+#[test]
+fn only_edited_materials_are_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.caustica");
+    let count = |scene: &Scene| {
+        Project::save(&path, &scene.document, &meta()).unwrap();
+        let value: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        value["materials"].as_array().map_or(0, Vec::len)
+    };
+    assert_eq!(count(&scene(folder.path())), 0);
+    assert_eq!(count(&edited(folder.path())), 2);
+}
+
+#[test]
+fn a_project_can_be_moved_with_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let (old, new) = (folder.path().join("old"), folder.path().join("new"));
+    std::fs::create_dir(&old).unwrap();
+    let scene = edited(&old);
+    Project::save(&old.join("scene.caustica"), &scene.document, &meta()).unwrap();
+    std::fs::rename(&old, &new).unwrap();
+    let project = Project::load(&new.join("scene.caustica")).unwrap();
+    assert!(project.warnings.is_empty());
+    assert_eq!(project.document.renderables().count(), 2);
+}
+
+#[test]
+fn a_missing_source_becomes_a_placeholder_and_nothing_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = edited(folder.path());
+    let path = folder.path().join("scene.caustica");
+    Project::save(&path, &scene.document, &meta()).unwrap();
+    let before = std::fs::read_to_string(&path).unwrap();
+    let model = folder.path().join("model.gltf");
+    let hidden = folder.path().join("hidden.gltf");
+    std::fs::rename(&model, &hidden).unwrap();
+    let project = Project::load(&path).unwrap();
+    assert!(project.document.prefab(scene.prefab).unwrap().missing);
+    assert!(project.warnings.iter().any(|w| w.message.contains("model.gltf")));
+    assert!(!caustica_scene::audit(&project.document).is_empty());
+    Project::save(&path, &project.document, &project.meta).unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
+    std::fs::rename(&hidden, &model).unwrap();
+    assert!(Project::load(&path).unwrap().document == scene.document);
+}
+
+#[test]
+fn unknown_fields_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = edited(folder.path());
+    let path = folder.path().join("scene.caustica");
+    Project::save(&path, &scene.document, &meta()).unwrap();
+    let mut value: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    value["future"] = json!({"x": [1, 2.5]});
+    value["nodes"][0]["colour"] = json!("red");
+    value["prefabs"][0]["hash"] = json!(12);
+    value["materials"][0]["note"] = json!("mine");
+    std::fs::write(&path, serde_json::to_vec(&value).unwrap()).unwrap();
+    let project = Project::load(&path).unwrap();
+    Project::save(&path, &project.document, &project.meta).unwrap();
+    let again: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    assert_eq!(again["future"], value["future"]);
+    assert_eq!(again["nodes"][0]["colour"], "red");
+    assert_eq!(again["prefabs"][0]["hash"], 12);
+    assert_eq!(again["materials"][0]["note"], "mine");
+}
+
+#[test]
+fn other_files_and_newer_versions_are_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.caustica");
+    let load = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        Project::load(&path).unwrap_err()
+    };
+    let newer = load(r#"{"caustica": 99}"#);
+    assert!(matches!(newer.problem, ProjectProblem::Newer { found: 99 }));
+    assert!(newer.to_string().contains("newer version"), "{newer}");
+    assert!(matches!(load("{}").problem, ProjectProblem::NotAProject));
+    assert!(matches!(load("no").problem, ProjectProblem::Json(_)));
+    let twice = r#"{"caustica":1,"nodes":[{"id":1,"name":"a"},{"id":1,"name":"b"}]}"#;
+    assert!(matches!(load(twice).problem, ProjectProblem::Broken(_)));
+    let orphan = r#"{"caustica":1,"nodes":[{"id":1,"name":"a","parent":7}]}"#;
+    assert!(load(orphan).to_string().contains("node 1"));
+    let typed = load("{\"caustica\":1,\n\"nodes\":[{\"id\":\"x\"}]}");
+    assert!(typed.to_string().contains("line 2"), "{typed}");
+}
+
+#[test]
+fn ids_stay_unique_after_loading() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.caustica");
+    // A file written by hand, without nextId and without the ids of what the prefab brings.
+    let text = r#"{"caustica":1,
+        "prefabs":[{"id":1,"name":"m","source":"model.gltf"},{"id":2,"name":"n","source":"model.gltf","meshes":[3]}],
+        "nodes":[{"id":41,"name":"a","prefab":1},{"id":42,"name":"b","prefab":2,"local":{"translation":[1,2,3]}}]}"#;
+    crate::common::model(folder.path());
+    std::fs::write(&path, text).unwrap();
+    let project = Project::load(&path).unwrap();
+    assert!(project.warnings.is_empty(), "{:?}", project.warnings);
+    let mut document = project.document;
+    assert_eq!(document.renderables().count(), 2);
+    assert_eq!(document.meshes().count(), 2);
+    let fresh = document.allocate_id();
+    assert!(fresh > 42 && document.textures().all(|(id, _)| id.0 < fresh));
+    let target = Target::node(caustica_scene::NodeId(42));
+    let trs = Trs::from_translation(DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(document.local(target), Some(Local::Trs(trs)));
+}

@@ -1,0 +1,323 @@
+//! The editor without its window: session, memory, panels and what goes on besides. Enters: egui's frame. Leaves:
+//! drawings and a changed session. It knows no winit and no swapchain, so that it can run in a test.
+
+use std::path::{Path, PathBuf};
+
+use egui::{CentralPanel, Context, Frame, Id, Margin, Modal, Panel, Ui, WidgetText};
+use egui_dock::{DockArea, DockState, TabViewer};
+
+use super::actions::{self, Action};
+use super::files::Loading;
+use crate::dialogs::Dialogs;
+use crate::panels::{self, Cx, bars, overlays};
+use crate::session::Session;
+use crate::theme;
+use crate::ui_state::{Config, Tab, UiState, default_layout};
+use crate::worker::Wake;
+
+/// What waits for an answer about unsaved changes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Then {
+    /// An empty scene.
+    New,
+    /// Ask for a file and open it.
+    AskAndOpen,
+    /// Open this file.
+    Open(PathBuf),
+    /// End the program.
+    Quit,
+}
+
+/// Session, memory, panels.
+pub struct Editor {
+    /// The open document and its picture.
+    pub session: Session,
+    /// What the window remembers.
+    pub state: UiState,
+    pub(super) dock: DockState<Tab>,
+    pub(super) dialogs: Dialogs,
+    pub(super) loading: Option<Loading>,
+    /// The question about unsaved changes, while it is shown.
+    pub(super) question: Option<Then>,
+    /// To be done once a save has succeeded.
+    pub(super) after_save: Option<Then>,
+    pub(super) quit: bool,
+    pub(super) wake: Wake,
+    theme_set: Option<bool>,
+}
+
+impl Editor {
+    /// An editor on a session. `wake` wakes the event loop from any thread.
+    pub fn new(session: Session, config: Config, wake: Wake) -> Self {
+        let dock = config.layout.clone().unwrap_or_else(default_layout);
+        let state = UiState { config, ..UiState::default() };
+        Self {
+            session,
+            state,
+            dock,
+            dialogs: Dialogs::default(),
+            loading: None,
+            question: None,
+            after_save: None,
+            quit: false,
+            wake,
+            theme_set: None,
+        }
+    }
+
+    /// Whether the user wants to end the program and nothing is in the way.
+    pub fn should_quit(&self) -> bool {
+        self.quit
+    }
+
+    /// Carries out an action after the next frame's panels, such as one asked for by the window system.
+    pub fn request(&mut self, action: Action) {
+        self.state.actions.push(action);
+    }
+
+    /// What to keep for the next run.
+    pub fn config(&self) -> Config {
+        Config { layout: Some(self.dock.clone()), ..self.state.config.clone() }
+    }
+
+    /// Text for the window's title bar.
+    pub fn title(&self) -> String {
+        let name = self.session.path().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+        let mark = if self.session.is_modified() { "\u{2022} " } else { "" };
+        format!("{mark}{} \u{2013} Caustica", name.as_deref().unwrap_or("unsaved scene"))
+    }
+
+    /// Saves what is not saved to a place of its own, as when the device is lost; gives the file's name.
+    pub fn rescue(&self) -> Option<PathBuf> {
+        if !self.session.is_modified() {
+            return None;
+        }
+        let folder = self.session.path().and_then(Path::parent).map_or_else(std::env::temp_dir, Path::to_path_buf);
+        let path = folder.join(format!("rescued-{}.caustica.json", std::process::id()));
+        let meta = caustica_scene::ProjectMeta::default();
+        match caustica_scene::Project::save(&path, self.session.document(), &meta) {
+            Ok(()) => Some(path),
+            Err(error) => {
+                tracing::error!("the unsaved changes cannot be rescued: {error}");
+                None
+            }
+        }
+    }
+
+    /// Draws everything and carries out what was asked for.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        let context = ui.ctx().clone();
+        self.apply_theme(&context);
+        self.state.pixels_per_point = context.pixels_per_point();
+        self.poll_loading();
+        self.take_keys(&context);
+        self.take_dropped_files(&context);
+        self.bars_and_panels(ui);
+        self.overlays(&context);
+        for action in std::mem::take(&mut self.state.actions) {
+            self.perform(action);
+        }
+        // A gesture lasts for as long as a button is held.
+        if !context.input(|input| input.pointer.any_down()) && self.state.view.drag.is_none() {
+            self.session.end_gesture();
+        }
+        self.state.selection.retain_in(self.session.document());
+        self.session.set_selection(self.state.selection.targets());
+    }
+
+    fn apply_theme(&mut self, context: &Context) {
+        let dark = self.state.config.dark;
+        if self.theme_set != Some(dark) {
+            theme::set_dark(context, dark);
+            self.theme_set = Some(dark);
+        }
+    }
+
+    fn take_keys(&mut self, context: &Context) {
+        let busy = self.state.view.flying
+            || self.state.view.drag.is_some()
+            || self.state.palette.is_some()
+            || self.question.is_some()
+            || self.dialogs.is_open();
+        if !busy {
+            let typing = context.text_edit_focused();
+            self.state.actions.extend(actions::pressed(context, typing));
+        }
+    }
+
+    fn take_dropped_files(&mut self, context: &Context) {
+        let dropped: Vec<PathBuf> =
+            context.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
+        for path in dropped {
+            self.drop_file(path);
+        }
+    }
+
+    fn bars_and_panels(&mut self, ui: &mut Ui) {
+        // Set again by the view's panel when it is drawn.
+        self.state.view.extent_px = None;
+        let shown_tabs: Vec<Tab> = self.dock.iter_all_tabs().map(|(_, tab)| *tab).collect();
+        let fill = theme::window_color(ui.visuals().dark_mode);
+        let bar = |margin| Frame::new().fill(fill).inner_margin(margin);
+        let mut cx = Cx { session: &mut self.session, state: &mut self.state };
+        Panel::top("menu")
+            .frame(bar(Margin::symmetric(8, 4)))
+            .show_separator_line(false)
+            .show(ui, |ui| bars::menu(&mut cx, ui, &shown_tabs));
+        Panel::top("tools")
+            .exact_size(38.0)
+            .frame(bar(Margin::symmetric(8, 4)))
+            .show_separator_line(false)
+            .show(ui, |ui| bars::tools(&mut cx, ui));
+        Panel::bottom("status")
+            .exact_size(26.0)
+            .frame(bar(Margin::symmetric(8, 2)))
+            .show_separator_line(false)
+            .show(ui, |ui| bars::status(&mut cx, ui));
+        let dock = &mut self.dock;
+        CentralPanel::no_frame().show(ui, |ui| {
+            let style = theme::dock_style(ui.style());
+            let mut tabs = Tabs { cx };
+            DockArea::new(dock)
+                .style(style)
+                .show_leaf_collapse_buttons(false)
+                .show_leaf_close_all_buttons(false)
+                .show_inside(ui, &mut tabs);
+        });
+    }
+
+    fn overlays(&mut self, context: &Context) {
+        if let Some((wish, path)) = self.dialogs.update(context) {
+            self.chosen(wish, path);
+        }
+        let progress = self.loading.as_ref().map(|loading| (loading.label(), loading.progress()));
+        if let Some((label, progress)) = progress
+            && overlays::progress(context, &self.state, &label, &progress)
+        {
+            self.loading = None;
+            self.state.toasts.info("Cancelled.");
+        }
+        overlays::palette(&mut self.state, context);
+        overlays::help(&mut self.state, &self.session, context);
+        overlays::toasts(&mut self.state, context);
+        overlays::drop_hint(context);
+        self.ask_about_changes(context);
+    }
+
+    fn ask_about_changes(&mut self, context: &Context) {
+        let Some(then) = self.question.clone() else { return };
+        let mut answer = None;
+        let modal = Modal::new(Id::new("unsaved")).show(context, |ui| {
+            ui.set_width(360.0);
+            ui.heading("Save the changes?");
+            ui.add_space(8.0);
+            ui.label("The scene has changes that are not saved. Without saving they are lost.");
+            ui.add_space(16.0);
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let save = ui.button("Save").on_hover_text("Save, then go on");
+                if self.state.view.extent_px.is_some() && context.memory(|memory| memory.focused().is_none()) {
+                    save.request_focus();
+                }
+                if save.clicked() {
+                    answer = Some(true);
+                }
+                if ui.button("Don't save").clicked() {
+                    answer = Some(false);
+                }
+                if ui.button("Cancel").clicked() {
+                    ui.close();
+                }
+            });
+        });
+        match answer {
+            Some(true) => {
+                self.question = None;
+                self.after_save = Some(then);
+                self.perform(Action::Save);
+            }
+            Some(false) => {
+                self.question = None;
+                self.go_on(then);
+            }
+            None if modal.should_close() => self.question = None,
+            None => {}
+        }
+    }
+
+    /// Does it at once, or asks first when there are unsaved changes.
+    pub(super) fn guarded(&mut self, then: Then) {
+        if self.session.is_modified() {
+            self.question = Some(then);
+        } else {
+            self.go_on(then);
+        }
+    }
+
+    /// Shows a panel: brings its tab to the front, or puts it back.
+    pub(super) fn show_tab(&mut self, tab: Tab) {
+        if self.dock.find_tab(&tab).is_none() {
+            self.dock.push_to_first_leaf(tab);
+        }
+        if let Some(path) = self.dock.find_tab(&tab)
+            && self.dock.set_active_tab(path).is_err()
+        {
+            tracing::debug!("the tab {} cannot be brought to the front", tab.name());
+        }
+    }
+
+    /// Puts all panels back to their places.
+    pub(super) fn reset_layout(&mut self) {
+        self.dock = default_layout();
+    }
+}
+
+/// Draws the panel of a tab.
+struct Tabs<'a> {
+    cx: Cx<'a>,
+}
+
+impl TabViewer for Tabs<'_> {
+    type Tab = Tab;
+
+    fn id(&mut self, tab: &mut Tab) -> Id {
+        Id::new(("panel", *tab))
+    }
+
+    fn title(&mut self, tab: &mut Tab) -> WidgetText {
+        tab.name().into()
+    }
+
+    fn ui(&mut self, ui: &mut Ui, tab: &mut Tab) {
+        match tab {
+            Tab::View => panels::view::ui(&mut self.cx, ui),
+            Tab::Outliner => panels::outliner::ui(&mut self.cx, ui),
+            Tab::Inspector => panels::inspector::ui(&mut self.cx, ui),
+            Tab::Render => panels::render::ui(&mut self.cx, ui),
+            Tab::Passes => panels::reports::passes(&mut self.cx, ui),
+            Tab::LeftOut => panels::reports::left_out(&mut self.cx, ui),
+            Tab::Health => panels::reports::health(&mut self.cx, ui),
+            Tab::Log => panels::reports::log(&mut self.cx, ui),
+        }
+    }
+
+    fn is_closeable(&self, tab: &Tab) -> bool {
+        *tab != Tab::View
+    }
+
+    fn allowed_in_windows(&self, tab: &mut Tab) -> bool {
+        *tab != Tab::View
+    }
+
+    fn scroll_bars(&self, tab: &Tab) -> [bool; 2] {
+        // The others scroll their own lists.
+        [false, matches!(tab, Tab::Inspector | Tab::Render)]
+    }
+
+    fn tab_style_override(&self, tab: &Tab, global: &egui_dock::TabStyle) -> Option<egui_dock::TabStyle> {
+        (*tab == Tab::View).then(|| {
+            let mut style = global.clone();
+            style.tab_body.inner_margin = Margin::same(0);
+            style
+        })
+    }
+}

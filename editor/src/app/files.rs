@@ -1,0 +1,229 @@
+//! Opening, importing and saving. Enters: file names. Leaves: a changed session; reading happens on a worker.
+
+use std::path::{Path, PathBuf};
+
+use super::editor::{Editor, Then};
+use crate::dialogs::{ENVIRONMENT_ENDINGS, MODEL_ENDINGS, Wish};
+use crate::session::{self, Loaded};
+use crate::ui_state::ToastKind;
+use crate::worker::{Answer, Job, Progress};
+
+/// What a file is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// As a new scene.
+    Open,
+    /// As a part of the scene.
+    Import,
+}
+
+/// A file that is being read.
+pub(super) struct Loading {
+    purpose: Purpose,
+    path: PathBuf,
+    job: Job<anyhow::Result<Loaded>>,
+}
+
+impl Loading {
+    /// What is going on, for the progress bar.
+    pub(super) fn label(&self) -> String {
+        self.job.label().to_owned()
+    }
+
+    /// How far it is.
+    pub(super) fn progress(&self) -> Progress {
+        self.job.progress()
+    }
+}
+
+impl Editor {
+    /// Asks for a file name.
+    pub(super) fn ask(&mut self, wish: Wish) {
+        let folder = match self.session.path().or(self.state.config.recent.first().map(PathBuf::as_path)) {
+            Some(path) => path.parent().map(Path::to_path_buf),
+            None => None,
+        };
+        let name = self.session.path().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+        let name = name.unwrap_or_else(|| "scene.caustica.json".to_owned());
+        self.dialogs.ask(wish, folder.as_deref(), &name, &self.wake);
+    }
+
+    /// A dialog gave a file name.
+    pub(super) fn chosen(&mut self, wish: Wish, path: PathBuf) {
+        match wish {
+            Wish::Open => self.load(Purpose::Open, path),
+            Wish::Import | Wish::Environment => self.load(Purpose::Import, path),
+            Wish::SaveAs => self.save_to(&path),
+        }
+    }
+
+    /// A file was dropped on the window.
+    pub(super) fn drop_file(&mut self, path: PathBuf) {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        if MODEL_ENDINGS.contains(&ending.as_str()) || ENVIRONMENT_ENDINGS.contains(&ending.as_str()) {
+            self.load(Purpose::Import, path);
+        } else if ending == "json" {
+            self.guarded(Then::Open(path));
+        } else {
+            self.state.toasts.error(format!("{}: this kind of file cannot be opened here.", path.display()));
+        }
+    }
+
+    /// Starts to read a file.
+    pub(super) fn load(&mut self, purpose: Purpose, path: PathBuf) {
+        if self.loading.is_some() {
+            self.state.toasts.warning("Another file is still being read; cancel it or wait.");
+            return;
+        }
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let label = match purpose {
+            Purpose::Open => format!("Opening {name}"),
+            Purpose::Import => format!("Importing {name}"),
+        };
+        let file = path.clone();
+        match Job::start(label, self.wake.clone(), move |progress| session::load(&file, progress)) {
+            Ok(job) => self.loading = Some(Loading { purpose, path, job }),
+            Err(error) => self.state.toasts.error(format!("{} cannot be read: {error}.", path.display())),
+        }
+    }
+
+    /// Takes over what a worker has read.
+    pub(super) fn poll_loading(&mut self) {
+        let Some(loading) = self.loading.take() else { return };
+        match loading.job.poll() {
+            Answer::Running => self.loading = Some(loading),
+            Answer::Died => {
+                let path = loading.path.display();
+                self.state.toasts.error(format!("{path}: reading the file failed in a way that was not foreseen; see the log."));
+            }
+            Answer::Done(Err(error)) => self.state.toasts.error(format!("{error:#}")),
+            Answer::Done(Ok(loaded)) => {
+                let result = match (loading.purpose, &loaded) {
+                    (_, Loaded::Environment(..)) | (Purpose::Import, _) => self.import(&loading.path, loaded),
+                    (Purpose::Open, _) => self.open(&loading.path, loaded),
+                };
+                if let Err(error) = result {
+                    self.state.toasts.error(format!("{}: {error:#}", loading.path.display()));
+                }
+            }
+        }
+    }
+
+    fn open(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
+        let warnings = warning_count(&loaded);
+        self.session.open(path, loaded)?;
+        self.state.config.remember(path);
+        self.new_scene_shown();
+        self.tell(format!("Opened {}", short(path)), warnings);
+        Ok(())
+    }
+
+    fn import(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
+        let warnings = warning_count(&loaded);
+        let was_empty = self.session.document().node_count() == 0;
+        let node = self.session.import(loaded)?;
+        self.session.end_gesture();
+        if let Some(node) = node {
+            self.state.selection.set(node.into());
+            self.state.outliner.reveal(self.session.document(), node.into());
+        }
+        if was_empty {
+            self.measure_scene();
+        }
+        self.tell(format!("Imported {}", short(path)), warnings);
+        Ok(())
+    }
+
+    fn tell(&mut self, done: String, warnings: usize) {
+        match warnings {
+            0 => self.state.toasts.info(format!("{done}.")),
+            1 => self.state.toasts.warning(format!("{done}, with one warning: see the log.")),
+            n => self.state.toasts.warning(format!("{done}, with {n} warnings: see the log.")),
+        }
+    }
+
+    /// Another document is shown: selection, open rows and distances of the old one mean nothing any more.
+    pub(super) fn new_scene_shown(&mut self) {
+        self.state.selection.clear();
+        self.state.outliner.reset();
+        self.state.health = None;
+        self.state.view.drag = None;
+        let roots: Vec<_> = self.session.document().roots().to_vec();
+        if let [only] = roots.as_slice() {
+            self.state.outliner.set_open((*only).into(), true);
+        }
+        self.measure_scene();
+    }
+
+    /// Sets the orbit's distance and the flying speed by the size of the scene.
+    pub(super) fn measure_scene(&mut self) {
+        let camera = self.session.camera();
+        let (eye, forward) = (camera.world_from_camera.translation, -camera.world_from_camera.matrix3.z_axis);
+        let Some((low, high)) = self.session.document().bounds() else {
+            self.state.view.distance_m = 5.0;
+            return;
+        };
+        let (center, size) = ((low + high) * 0.5, (high - low).length());
+        let ahead = (center - eye).dot(forward);
+        self.state.view.distance_m = if ahead > size * 0.02 { ahead } else { size * 0.5 }.max(1e-4);
+        self.state.view.fly_speed_m_s = (size * 0.25).clamp(1e-3, 1e4);
+    }
+
+    /// Saves where it was saved before, or asks where.
+    pub(super) fn save(&mut self) {
+        match self.session.path().map(Path::to_path_buf) {
+            Some(path) if is_project(&path) => self.save_to(&path),
+            _ => self.ask(Wish::SaveAs),
+        }
+    }
+
+    fn save_to(&mut self, path: &Path) {
+        match self.session.save(path) {
+            Ok(()) => {
+                self.state.config.remember(path);
+                self.state.toasts.info(format!("Saved {}.", short(path)));
+                if let Some(then) = self.after_save.take() {
+                    self.go_on(then);
+                }
+            }
+            Err(error) => {
+                self.after_save = None;
+                self.state.toasts.error(format!("The scene is not saved: {error:#}."));
+            }
+        }
+    }
+
+    /// Goes on after the question about unsaved changes.
+    pub(super) fn go_on(&mut self, then: Then) {
+        match then {
+            Then::New => match self.session.new_document() {
+                Ok(()) => self.new_scene_shown(),
+                Err(error) => self.state.toasts.error(format!("No new scene: {error:#}.")),
+            },
+            Then::AskAndOpen => self.ask(Wish::Open),
+            Then::Open(path) => self.load(Purpose::Open, path),
+            Then::Quit => self.quit = true,
+        }
+    }
+
+    /// Whether an error is shown now; tests look at it.
+    pub fn shows_error(&self) -> bool {
+        self.state.toasts.items.iter().any(|toast| toast.kind == ToastKind::Error)
+    }
+}
+
+fn warning_count(loaded: &Loaded) -> usize {
+    match loaded {
+        Loaded::Project(project) => project.warnings.len(),
+        Loaded::Model(model) => model.warnings.len(),
+        Loaded::Environment(..) => 0,
+    }
+}
+
+fn is_project(path: &Path) -> bool {
+    path.to_string_lossy().to_lowercase().ends_with(".json")
+}
+
+fn short(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}

@@ -1,0 +1,113 @@
+//! The command line: what it accepts, and which exit code an error becomes. One file a subcommand.
+
+mod check;
+mod devices;
+mod output;
+mod render;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use caustica_renderer::RendererError;
+use caustica_renderer::gpu::{Device, DeviceOptions, GpuError, Instance, InstanceOptions, Requirements};
+use clap::{Args, Parser, Subcommand};
+
+/// Scene editor with a hybrid Vulkan ray-tracing renderer. Without a subcommand the editor opens.
+#[derive(Parser, Debug)]
+#[command(name = "caustica", version, about, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// A project, .gltf, .glb or .obj to open in the editor (default: the demo project, where it is found)
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Read shaders from this folder instead of the copy in the binary
+    #[arg(long, value_name = "DIR")]
+    shaders: Option<PathBuf>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Render a project or model to a PNG or EXR
+    Render(render::RenderArgs),
+    /// Audit a project or model: structure and numbers; exit code 1 on errors
+    Check(check::CheckArgs),
+    /// List the Vulkan devices, what each lacks, and which one is chosen
+    Devices(devices::DevicesArgs),
+}
+
+/// Which device, and how.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct DeviceArgs {
+    /// Use the device with this name (or part of it) or index; see `caustica devices`
+    #[arg(long, value_name = "NAME|INDEX", global = true)]
+    device: Option<String>,
+    /// Load the Vulkan validation layer and log its messages
+    #[arg(long, global = true)]
+    validation: bool,
+    /// Refuse to use more than this much device memory
+    #[arg(long, value_name = "MIB", global = true)]
+    memory_budget: Option<u64>,
+}
+
+impl DeviceArgs {
+    /// Opens the device for work without a window.
+    fn open(&self) -> Result<Arc<Device>, GpuError> {
+        let instance = Instance::new(InstanceOptions { validation: self.validation, display: None })?;
+        let requirements = Requirements { device: self.device.clone(), present: false };
+        let memory_limit_bytes = self.memory_budget.map(|mib| mib.saturating_mul(1 << 20));
+        Device::new(&instance, &DeviceOptions { requirements, memory_limit_bytes })
+    }
+}
+
+/// The input is at fault.
+const EXIT_INPUT: u8 = 1;
+/// Wrong usage.
+const EXIT_USAGE: u8 = 2;
+/// No suitable device, or the device failed.
+const EXIT_DEVICE: u8 = 3;
+
+/// Parses the command line and runs it.
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are not errors; clap prints both where they belong.
+            let code = if error.use_stderr() { EXIT_USAGE } else { 0 };
+            return if error.print().is_ok() { ExitCode::from(code) } else { ExitCode::from(EXIT_USAGE) };
+        }
+    };
+    let result = match cli.command {
+        Some(Command::Render(args)) => logged(|| render::run(&args, &cli.device, cli.shaders.clone())),
+        Some(Command::Check(args)) => logged(|| check::run(&args)),
+        Some(Command::Devices(args)) => logged(|| devices::run(&args)),
+        None => Err(anyhow::anyhow!("the window comes with the next commit; see `caustica render --help`")),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::from(exit_code_of(&error))
+    })
+}
+
+/// Runs a subcommand with warnings printed to standard error.
+fn logged(run: impl FnOnce() -> anyhow::Result<ExitCode>) -> anyhow::Result<ExitCode> {
+    let filter = tracing_subscriber::EnvFilter::try_from_env("CAUSTICA_LOG")
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
+    let subscriber = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .finish();
+    tracing::subscriber::with_default(subscriber, run)
+}
+
+/// 3 when the device is at fault, else 1.
+fn exit_code_of(error: &anyhow::Error) -> u8 {
+    let from_device = error.chain().any(|cause| {
+        cause.downcast_ref::<GpuError>().is_some()
+            || matches!(cause.downcast_ref::<RendererError>(), Some(RendererError::Gpu(_)))
+    });
+    if from_device { EXIT_DEVICE } else { EXIT_INPUT }
+}

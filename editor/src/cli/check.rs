@@ -1,0 +1,75 @@
+//! `caustica check`: numerical and structural audit of a file; exit code 1 on errors.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use caustica_scene::{Document, Severity, audit};
+use clap::Args;
+use serde_json::json;
+
+use super::EXIT_INPUT;
+use crate::session::{Loaded, load};
+
+/// Arguments of `caustica check`.
+#[derive(Args, Debug)]
+pub(super) struct CheckArgs {
+    /// A project, .gltf, .glb or .obj
+    file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Audits the file.
+pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
+    let (document, warnings) = match load(&args.file, &|_, _| {})? {
+        Loaded::Project(project) => (project.document, project.warnings),
+        Loaded::Model(imported) => {
+            let warnings = imported.warnings.clone();
+            let mut document = Document::new();
+            let prefab = document.add_imported(*imported)?;
+            let (_, place) = document.instantiate_edit(prefab, None, caustica_scene::Local::default());
+            document.apply(place)?;
+            (document, warnings)
+        }
+        Loaded::Environment(..) => {
+            anyhow::bail!("{}: an environment has no scene to check", args.file.display())
+        }
+    };
+    let findings = audit(&document);
+    let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
+    let triangles: usize =
+        document.renderables().filter_map(|r| document.mesh(r.mesh).map(|mesh| mesh.triangle_count())).sum();
+    if args.json {
+        let list: Vec<_> = findings
+            .iter()
+            .map(|f| json!({ "severity": format!("{:?}", f.severity).to_lowercase(), "message": f.message }))
+            .collect();
+        let warnings: Vec<_> = warnings.iter().map(ToString::to_string).collect();
+        println!(
+            "{}",
+            json!({
+                "file": args.file,
+                "errors": errors,
+                "findings": list,
+                "import_warnings": warnings,
+                "triangles": triangles,
+                "materials": document.materials().count(),
+                "textures": document.textures().count(),
+            })
+        );
+    } else {
+        for finding in &findings {
+            println!("{:?}: {}", finding.severity, finding.message);
+        }
+        println!(
+            "{}: {triangles} triangles, {} materials, {} textures, {} import warnings, {} findings, {errors} errors",
+            args.file.display(),
+            document.materials().count(),
+            document.textures().count(),
+            warnings.len(),
+            findings.len()
+        );
+    }
+    Ok(if errors == 0 { ExitCode::SUCCESS } else { ExitCode::from(EXIT_INPUT) })
+}

@@ -1,0 +1,346 @@
+//! `caustica render`: a project or model to an image file.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use caustica_renderer::{NeedsMode, Pipeline, Show, Statistics, ToneMap, ViewSettings};
+use caustica_scene::Edit;
+use clap::{ArgGroup, Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+
+use super::DeviceArgs;
+use super::output::{self, Kind, Metadata};
+use crate::session::{Session, SessionOptions, ViewCamera, environment_argument, load};
+
+/// Frames of which the times are kept for the median.
+const TIMED_FRAMES: usize = 4096;
+/// Samples when nothing else is said.
+const DEFAULT_SAMPLES: u64 = 64;
+
+/// Arguments of `caustica render`.
+#[derive(Args, Debug)]
+#[command(group(ArgGroup::new("until").args(["samples", "time", "target_error"])))]
+pub(super) struct RenderArgs {
+    /// A project, .gltf, .glb or .obj
+    file: PathBuf,
+    /// Where the image goes: .png (tone mapped) or .exr (radiance)
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// How the image is made
+    #[arg(long, value_enum)]
+    pipeline: Option<PipelineArg>,
+    /// Size in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1280x720")]
+    size: [u32; 2],
+    /// Samples a pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    samples: Option<u64>,
+    /// Seconds to render
+    #[arg(long, value_name = "SECONDS")]
+    time: Option<f64>,
+    /// Stop at this noise: sqrt(relMSE) estimated from two independent streams, 0.01 is 1 %
+    #[arg(long, value_name = "X")]
+    target_error: Option<f64>,
+    /// Name of the camera
+    #[arg(long)]
+    camera: Option<String>,
+    /// An environment map (.hdr, .exr), or a constant radiance R,G,B
+    #[arg(long, value_name = "FILE|R,G,B")]
+    environment: Option<String>,
+    /// Seed of all random numbers
+    #[arg(long)]
+    seed: Option<u32>,
+    /// Reflections and refractions after the first surface
+    #[arg(long, value_name = "N")]
+    max_depth: Option<u32>,
+    /// Shadow rays a light and pixel
+    #[arg(long, value_name = "N")]
+    shadow_rays: Option<u32>,
+    /// First sample of a set that is rendered in parts
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    sample_offset: u64,
+    /// Leave out what the scene does not need, or build everything
+    #[arg(long, value_enum)]
+    needs: Option<NeedsArg>,
+    /// Exposure in stops
+    #[arg(long, value_name = "EV", allow_negative_numbers = true)]
+    exposure: Option<f32>,
+    /// Tone map of a PNG
+    #[arg(long, value_enum)]
+    tone_map: Option<ToneMapArg>,
+    /// What a PNG shows: the image, or an intermediate target such as base_color, normal, depth
+    #[arg(long, value_name = "TARGET", value_parser = parse_show)]
+    show: Option<Show>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PipelineArg {
+    Raster,
+    Hybrid,
+    Raytraced,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum NeedsArg {
+    Auto,
+    All,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ToneMapArg {
+    Linear,
+    Aces,
+    Agx,
+    Neutral,
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
+    let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));
+    match [side(width)?, side(height)?] {
+        [0, _] | [_, 0] => Err(String::from("a side of 0 pixels")),
+        size => Ok(size),
+    }
+}
+
+fn parse_show(text: &str) -> Result<Show, String> {
+    serde_json::from_value(json!(text)).map_err(|_| {
+        let names: Vec<String> = Show::ALL
+            .iter()
+            .filter_map(|(show, _)| serde_json::to_value(show).ok()?.as_str().map(str::to_owned))
+            .collect();
+        format!("one of {}", names.join(", "))
+    })
+}
+
+/// Renders the file.
+pub(super) fn run(
+    args: &RenderArgs,
+    device: &DeviceArgs,
+    shaders: Option<PathBuf>,
+) -> anyhow::Result<ExitCode> {
+    let kind = output::kind_of(&args.output)?;
+    let start = Instant::now();
+    let progress = progress_bar(args);
+    progress.set_message("loading");
+    let loaded = load(&args.file, &|step, share| {
+        progress.set_message(step.to_owned());
+        progress.set_position((share * 100.0) as u64);
+    })?;
+    let environment = args.environment.as_deref().map(environment_argument).transpose()?;
+    let device = device.open()?;
+    let mut session =
+        Session::new(&device, SessionOptions { shaders, extent: args.size, ..SessionOptions::default() })?;
+    session.open(&args.file, loaded)?;
+    if let Some(environment) = environment {
+        session.push(Edit::SetEnvironment(environment))?;
+    }
+    if let Some(name) = &args.camera {
+        let known: Vec<String> =
+            session.document().cameras().map(|c| session.document().display_name(c.target)).collect();
+        if session.document().find_camera(name).is_none() {
+            bail!("{}: no camera '{name}'; there are: {}", args.file.display(), known.join(", "));
+        }
+        session.set_camera(ViewCamera::of_document(session.document(), Some(name)));
+    }
+    session.set_settings(settings_of(args, session.settings().clone()));
+    session.set_sample_offset(args.sample_offset)?;
+    let loaded_in = start.elapsed();
+    let run = accumulate(&mut session, args, &progress)?;
+    progress.finish_and_clear();
+    let metadata = Metadata {
+        samples: session.samples(),
+        sample_offset: args.sample_offset,
+        seconds: run.seconds,
+        device: format!("{}, {}", device.name(), device.driver()),
+        pipeline: session.settings().pipeline.name(),
+        seed: session.settings().seed,
+    };
+    let accumulated = session.read_back()?;
+    let noise = noise_of(&accumulated);
+    match kind {
+        Kind::Exr => output::write_exr(&args.output, args.size, &accumulated.mean, &metadata)?,
+        Kind::Png => output::write_png(&args.output, args.size, &session.read_display()?)?,
+    }
+    report_validation(&device)?;
+    if args.json {
+        println!("{}", summary(args, session.statistics(), &metadata, &run, noise, loaded_in));
+    } else {
+        println!(
+            "{}: {}x{}, {} samples in {:.2} s ({}), noise {:.2} %, {}",
+            args.output.display(),
+            args.size[0],
+            args.size[1],
+            metadata.samples,
+            metadata.seconds,
+            metadata.pipeline,
+            noise * 100.0,
+            metadata.device
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Messages of the validation layer are an error of ours: they are never silent.
+fn report_validation(device: &caustica_renderer::gpu::Device) -> anyhow::Result<()> {
+    let messages = device.instance().take_messages();
+    match messages.first() {
+        Some(first) => {
+            bail!("{} validation messages, the first: {}: {}", messages.len(), first.id, first.text)
+        }
+        None => Ok(()),
+    }
+}
+
+fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
+    ViewSettings {
+        pipeline: args.pipeline.map_or(of_project.pipeline, |pipeline| match pipeline {
+            PipelineArg::Raster => Pipeline::Raster,
+            PipelineArg::Hybrid => Pipeline::Hybrid,
+            PipelineArg::Raytraced => Pipeline::Raytraced,
+        }),
+        needs: args.needs.map_or(of_project.needs, |needs| match needs {
+            NeedsArg::Auto => NeedsMode::Auto,
+            NeedsArg::All => NeedsMode::All,
+        }),
+        tone_map: args.tone_map.map_or(of_project.tone_map, |tone_map| match tone_map {
+            ToneMapArg::Linear => ToneMap::Linear,
+            ToneMapArg::Aces => ToneMap::Aces,
+            ToneMapArg::Agx => ToneMap::Agx,
+            ToneMapArg::Neutral => ToneMap::Neutral,
+        }),
+        show: args.show.unwrap_or_default(),
+        exposure_ev: args.exposure.unwrap_or(of_project.exposure_ev),
+        seed: args.seed.unwrap_or(of_project.seed),
+        max_depth: args.max_depth.unwrap_or(of_project.max_depth),
+        shadow_rays: args.shadow_rays.unwrap_or(of_project.shadow_rays),
+        temporal: false,
+        ..of_project
+    }
+}
+
+/// How a run went.
+struct Run {
+    seconds: f64,
+    /// Milliseconds of each frame, by pass.
+    frames: Vec<Vec<(String, f64)>>,
+}
+
+fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) -> anyhow::Result<Run> {
+    let samples = args.samples.unwrap_or(if args.time.is_some() || args.target_error.is_some() {
+        u64::MAX
+    } else {
+        DEFAULT_SAMPLES
+    });
+    let limit =
+        args.time.map(|seconds| Duration::try_from_secs_f64(seconds).context("--time")).transpose()?;
+    progress.set_length(if samples == u64::MAX { 0 } else { samples });
+    progress.set_message("rendering");
+    let start = Instant::now();
+    let mut frames = Vec::new();
+    while session.samples() < samples && limit.is_none_or(|limit| start.elapsed() < limit) {
+        let recorder = session.begin_frame(args.size)?;
+        session.submit(recorder, None)?;
+        let times = &session.statistics().passes;
+        if frames.len() < TIMED_FRAMES && !times.is_empty() {
+            frames.push(times.clone());
+        }
+        progress.set_position(session.samples());
+        let done = session.samples();
+        // Looked at a few times only: reading back waits for the device.
+        if let Some(target) = args.target_error
+            && done >= 16
+            && done.is_power_of_two()
+            && noise_of(&session.read_back()?) <= target
+        {
+            break;
+        }
+    }
+    session.finish()?;
+    frames.push(session.statistics().passes.clone());
+    Ok(Run { seconds: start.elapsed().as_secs_f64(), frames })
+}
+
+/// sqrt(relMSE) of the mean by the two streams: their half difference has the variance of the mean.
+fn noise_of(image: &caustica_renderer::Accumulated) -> f64 {
+    let terms = image.mean.iter().flatten().zip(image.half_difference.iter().flatten());
+    let sum: f64 = terms
+        .map(|(mean, half)| {
+            let (mean, half) = (f64::from(*mean), f64::from(*half));
+            half * half / (mean * mean + 0.01)
+        })
+        .sum();
+    (sum / (image.mean.len().max(1) * 3) as f64).sqrt()
+}
+
+fn summary(
+    args: &RenderArgs,
+    statistics: &Statistics,
+    metadata: &Metadata,
+    run: &Run,
+    noise: f64,
+    loaded_in: Duration,
+) -> serde_json::Value {
+    let passes: serde_json::Map<String, serde_json::Value> =
+        medians(&run.frames).into_iter().map(|(label, ms)| (label, json!(ms))).collect();
+    let memory: serde_json::Map<String, serde_json::Value> =
+        statistics.memory.iter().map(|(kind, bytes)| (kind.clone(), json!(bytes))).collect();
+    json!({
+        "output": args.output,
+        "size": args.size,
+        "pipeline": metadata.pipeline,
+        "device": metadata.device,
+        "version": env!("CARGO_PKG_VERSION"),
+        "samples": metadata.samples,
+        "sample_offset": metadata.sample_offset,
+        "seconds": metadata.seconds,
+        "load_seconds": loaded_in.as_secs_f64(),
+        "ms_per_pass": passes,
+        "noise": noise,
+        "acceleration_structures": statistics.acceleration,
+        "memory_bytes": memory,
+        "non_finite_samples": statistics.non_finite,
+        "reset_reason": statistics.reset_reason,
+        "left_out": statistics.left_out,
+    })
+}
+
+/// Median milliseconds of each pass, in order of the first frame that has it; passes of a few frames only (builds at
+/// the start) come first.
+fn medians(frames: &[Vec<(String, f64)>]) -> Vec<(String, f64)> {
+    let mut labels: Vec<&String> = Vec::new();
+    for (label, _) in frames.iter().flatten() {
+        if !labels.contains(&label) {
+            labels.push(label);
+        }
+    }
+    labels
+        .into_iter()
+        .map(|label| {
+            let mut times: Vec<f64> =
+                frames.iter().flatten().filter(|(l, _)| l == label).map(|(_, ms)| *ms).collect();
+            times.sort_by(f64::total_cmp);
+            (label.clone(), times[times.len() / 2])
+        })
+        .collect()
+}
+
+fn progress_bar(args: &RenderArgs) -> ProgressBar {
+    if args.json || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(100);
+    if let Ok(style) =
+        ProgressStyle::with_template("{msg:12} [{bar:40}] {pos}/{len} {elapsed} (about {eta} left)")
+    {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,300 @@
+//! The selected object: name, transform, materials, light, camera. Enters: the document. Leaves: edits; a drag of a
+//! field is one step of the history because its edits join.
+
+use caustica_scene::{Camera, Edit, Light, LightKind, Local, NodeKind, OverrideField, Projection, Target, Trs};
+use egui::{DragValue, RichText, TextEdit, Ui};
+use egui_phosphor::regular as icon;
+use glam::DVec3;
+
+use super::{Cx, field, light_icon, section, target_icon};
+use crate::gizmo::paint::axis_color;
+
+/// Draws the panel.
+pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let Some(target) = cx.state.selection.active() else {
+        super::empty_note(ui, "Select an object in the view or in the outliner.");
+        ui.add_space(8.0);
+        section(ui, "Environment", |ui| super::environment::ui(cx, ui));
+        return;
+    };
+    header(cx, ui, target);
+    section(ui, "Transform", |ui| transform(cx, ui, target));
+    if let Some(light) = cx.session.document().light_of(target) {
+        section(ui, "Light", |ui| light_ui(cx, ui, target, light));
+    }
+    if let Some(camera) = cx.session.document().camera_of(target) {
+        section(ui, "Camera", |ui| camera_ui(cx, ui, target, camera));
+    }
+    if cx.session.document().mesh_of(target).is_some() {
+        super::material::ui(cx, ui, target);
+    }
+    source(cx, ui, target);
+}
+
+fn header(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(target_icon(cx, target)).size(18.0));
+        name_field(cx, ui, target);
+        let visible = cx.session.document().visible(target).unwrap_or(true);
+        let eye = if visible { icon::EYE } else { icon::EYE_SLASH };
+        if ui.add(egui::Button::new(eye).frame(false)).on_hover_text("Show or hide this and everything below it").clicked() {
+            cx.push(Edit::SetVisible { target, visible: !visible });
+        }
+    });
+    let others = cx.state.selection.targets().len() - 1;
+    if others > 0 {
+        ui.weak(format!("and {others} more selected; the fields change the one shown"));
+    }
+    ui.add_space(6.0);
+}
+
+fn name_field(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
+    let shown = cx.session.document().display_name(target);
+    let typed = match cx.state.inspector.name.take() {
+        Some((whose, text)) if whose == target => text,
+        _ => shown.clone(),
+    };
+    let mut text = typed;
+    let width = ui.available_width() - 34.0;
+    let response = ui.add(TextEdit::singleline(&mut text).desired_width(width).id_salt(("name", target)));
+    if response.lost_focus() {
+        let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape));
+        if !escaped && text != shown {
+            cx.push(Edit::Rename { target, name: text });
+        }
+    } else if response.has_focus() {
+        cx.state.inspector.name = Some((target, text));
+    }
+}
+
+fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
+    let Some(local) = cx.session.document().local(target) else { return };
+    let trs = local.nearest_trs();
+    let mut push = |trs: Trs| cx.session.push(Edit::SetTransform { target, local: Local::Trs(trs) });
+    let mut result = Ok(());
+
+    let speed = (trs.translation.abs().max_element() * 0.002).clamp(0.002, 1.0);
+    let moved = vector_field(ui, "Position", "Metres against the parent", trs.translation, speed, " m", DVec3::ZERO);
+    if let Some(translation) = moved {
+        result = push(Trs { translation, ..trs });
+    }
+    let shown = cx.state.inspector.euler.degrees(target, trs.rotation);
+    let tip = "Degrees about X, then Y, then Z (fixed axes of the parent)";
+    if let Some(degrees) = vector_field(ui, "Rotation", tip, shown, 0.5, "\u{b0}", DVec3::ZERO) {
+        let rotation = cx.state.inspector.euler.set(target, degrees);
+        result = push(Trs { rotation, ..trs });
+    }
+    let tip = "Along the object's own axes; negative mirrors";
+    if let Some(mut scale) = vector_field(ui, "Scale", tip, trs.scale, 0.01, "", DVec3::ONE) {
+        if cx.state.inspector.uniform_scale {
+            scale = uniform(trs.scale, scale);
+        }
+        result = push(Trs { scale, ..trs });
+    }
+    ui.checkbox(&mut cx.state.inspector.uniform_scale, "Scale all axes together");
+    if matches!(local, Local::Matrix(_)) {
+        ui.colored_label(ui.visuals().warn_fg_color, "This transform has shear; changing a field removes it.");
+    }
+    if let Err(error) = result {
+        cx.state.toasts.error(format!("That cannot be done: {error}."));
+    }
+}
+
+/// Scales all axes by the factor by which one was changed.
+fn uniform(old: DVec3, new: DVec3) -> DVec3 {
+    let axis = (0..3).find(|&axis| old[axis] != new[axis]);
+    match axis {
+        Some(axis) if old[axis].abs() > 1e-12 => old * (new[axis] / old[axis]),
+        Some(axis) => DVec3::splat(new[axis]),
+        None => new,
+    }
+}
+
+fn vector_field(
+    ui: &mut Ui,
+    name: &str,
+    tip: &str,
+    value: DVec3,
+    speed: f64,
+    suffix: &str,
+    rest: DVec3,
+) -> Option<DVec3> {
+    let mut edited = value;
+    let mut changed = false;
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(name).weak()).on_hover_text(tip);
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let reset = egui::Button::new(icon::ARROW_COUNTER_CLOCKWISE).frame(false);
+            if ui.add_enabled(value != rest, reset).on_hover_text("Back to the neutral value").clicked() {
+                edited = rest;
+                changed = true;
+            }
+        });
+    });
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let width = ((ui.available_width() - 8.0) / 3.0).max(48.0);
+        for axis in 0..3 {
+            let letter = RichText::new(["X", "Y", "Z"][axis]).color(axis_color(axis)).small().strong();
+            let drag = DragValue::new(&mut edited[axis])
+                .speed(speed)
+                .max_decimals(4)
+                .prefix(letter)
+                .suffix(suffix)
+                .update_while_editing(false);
+            changed |= ui.add_sized([width, ui.spacing().interact_size.y], drag).changed();
+        }
+    });
+    ui.add_space(2.0);
+    (changed && edited.is_finite()).then_some(edited)
+}
+
+fn light_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Light) {
+    let mut light = old;
+    field(ui, "Kind", "What the light looks like from afar", |ui| kind_menu(ui, &mut light.kind));
+    field(ui, "Colour", "Linear colour, multiplied by the intensity", |ui| {
+        let mut rgb = light.color.to_array();
+        ui.color_edit_button_rgb(&mut rgb);
+        light.color = rgb.into();
+    });
+    let (unit, tip) = match light.kind {
+        LightKind::Directional { .. } => (" lx", "Illuminance in lux, on a surface that faces the light"),
+        _ => (" cd", "Luminous intensity in candela: lux at one metre"),
+    };
+    field(ui, "Intensity", tip, |ui| {
+        let speed = f64::from(light.intensity.abs().max(0.1)) * 0.01;
+        ui.add(DragValue::new(&mut light.intensity).range(0.0..=1e9).speed(speed).suffix(unit));
+    });
+    match &mut light.kind {
+        LightKind::Point { radius_m, range_m } => {
+            radius_field(ui, radius_m);
+            range_field(ui, range_m);
+        }
+        LightKind::Spot { radius_m, range_m, inner_rad, outer_rad } => {
+            radius_field(ui, radius_m);
+            range_field(ui, range_m);
+            angle_field(ui, "Inner cone", "Full strength inside this angle from the axis", inner_rad, 0.0, 89.0);
+            angle_field(ui, "Outer cone", "No light outside this angle from the axis", outer_rad, 0.1, 90.0);
+            *inner_rad = inner_rad.min(*outer_rad);
+        }
+        LightKind::Directional { angular_radius_rad } => {
+            let tip = "Half the angle under which the light is seen; the sun has 0.27 degrees. Zero gives hard shadows";
+            angle_field(ui, "Angular radius", tip, angular_radius_rad, 0.0, 45.0);
+        }
+    }
+    if light != old {
+        cx.push(Edit::SetLight { target, light });
+    }
+}
+
+fn kind_menu(ui: &mut Ui, kind: &mut LightKind) {
+    let radius = match *kind {
+        LightKind::Point { radius_m, .. } | LightKind::Spot { radius_m, .. } => radius_m,
+        LightKind::Directional { .. } => 0.05,
+    };
+    let kinds = [
+        ("Point", LightKind::Point { radius_m: radius, range_m: None }),
+        ("Spot", LightKind::Spot { radius_m: radius, range_m: None, inner_rad: 0.4, outer_rad: 0.6 }),
+        ("Sun", LightKind::Directional { angular_radius_rad: 0.00465 }),
+    ];
+    let same = |a: &LightKind| std::mem::discriminant(a) == std::mem::discriminant(kind);
+    let name = kinds.iter().find(|(_, k)| same(k)).map_or("", |(name, _)| name);
+    egui::ComboBox::from_id_salt("light kind").selected_text(format!("{}  {name}", light_icon(kind))).show_ui(ui, |ui| {
+        for (name, new) in kinds {
+            let selected = std::mem::discriminant(&new) == std::mem::discriminant(kind);
+            if ui.selectable_label(selected, format!("{}  {name}", light_icon(&new))).clicked() && !selected {
+                *kind = new;
+            }
+        }
+    });
+}
+
+fn radius_field(ui: &mut Ui, radius_m: &mut f32) {
+    field(ui, "Radius", "Of the shining sphere: larger gives softer shadows, zero hard ones", |ui| {
+        ui.add(DragValue::new(radius_m).range(0.0..=1e4).speed(0.002).max_decimals(4).suffix(" m"));
+    });
+}
+
+fn range_field(ui: &mut Ui, range_m: &mut Option<f32>) {
+    field(ui, "Range", "The light ends here; without a range it reaches everywhere", |ui| {
+        let mut limited = range_m.is_some();
+        ui.checkbox(&mut limited, "");
+        match (limited, *range_m) {
+            (true, None) => *range_m = Some(10.0),
+            (false, Some(_)) => *range_m = None,
+            _ => {}
+        }
+        if let Some(range) = range_m {
+            ui.add(DragValue::new(range).range(1e-3..=1e9).speed(0.05).suffix(" m"));
+        }
+    });
+}
+
+fn angle_field(ui: &mut Ui, name: &str, tip: &str, angle_rad: &mut f32, low: f32, high: f32) {
+    field(ui, name, tip, |ui| {
+        let mut degrees = angle_rad.to_degrees();
+        let drag = DragValue::new(&mut degrees).range(low..=high).speed(0.1).max_decimals(3).suffix("\u{b0}");
+        if ui.add(drag).changed() {
+            *angle_rad = degrees.to_radians();
+        }
+    });
+}
+
+fn camera_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Camera) {
+    let mut camera = old;
+    match &mut camera.projection {
+        Projection::Perspective { yfov_rad } => {
+            angle_field(ui, "Field of view", "From the lower to the upper edge of the picture", yfov_rad, 1.0, 170.0);
+        }
+        Projection::Orthographic { ymag_m } => {
+            field(ui, "Half height", "Of the picture, metres", |ui| {
+                ui.add(DragValue::new(ymag_m).range(1e-4..=1e6).speed(0.01).suffix(" m"));
+            });
+        }
+    }
+    field(ui, "Near", "Nothing nearer than this is seen", |ui| {
+        ui.add(DragValue::new(&mut camera.near_m).range(1e-6..=1e3).speed(0.001).max_decimals(5).suffix(" m"));
+    });
+    if camera != old {
+        cx.push(Edit::SetCamera { target, camera });
+    }
+    let chosen = cx.session.document().main_camera().is_some_and(|main| main.target == target);
+    ui.horizontal(|ui| {
+        let button = egui::Button::new(format!("{}  Render with this camera", icon::APERTURE)).selected(chosen);
+        let tip = "The command line and the 0 key use this camera when none is named";
+        if ui.add(button).on_hover_text(tip).clicked() && !chosen {
+            cx.push(Edit::SetDefaultCamera(Some(target)));
+        }
+    });
+}
+
+fn source(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
+    let document = cx.session.document();
+    let Some(node) = document.node(target.node) else { return };
+    let NodeKind::Prefab { prefab, .. } = &node.kind else { return };
+    let Some(prefab) = document.prefab(*prefab) else { return };
+    let (source, missing) = (prefab.source.display().to_string(), prefab.missing);
+    let changed = document.part_override(target).is_some();
+    section(ui, "Source", |ui| {
+        ui.label(RichText::new(&source).small()).on_hover_text("The file that this instance shows");
+        if missing {
+            ui.colored_label(ui.visuals().error_fg_color, "The file was not found: nothing is shown in its place.");
+        }
+        if target.part.is_some() && ui.add_enabled(changed, egui::Button::new("Follow the source again")).clicked() {
+            cx.push(Edit::ResetOverride { target, field: OverrideField::All });
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scaling_together_keeps_proportions() {
+        let old = DVec3::new(1.0, 2.0, -4.0);
+        assert_eq!(uniform(old, DVec3::new(1.0, 3.0, -4.0)), DVec3::new(1.5, 3.0, -6.0));
+        assert_eq!(uniform(DVec3::ZERO, DVec3::new(0.0, 2.0, 0.0)), DVec3::splat(2.0));
+        assert_eq!(uniform(old, old), old);
+    }
+}

@@ -1,0 +1,119 @@
+//! Settings of the picture: environment, pipeline, exposure, sampling. Enters and leaves: the view's settings.
+
+use caustica_renderer::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+use egui::{DragValue, Slider, Ui};
+
+use super::{Cx, field, section};
+
+/// Draws the panel.
+pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
+    section(ui, "Environment", |ui| super::environment::ui(cx, ui));
+    let old = cx.session.settings().clone();
+    let mut new = old.clone();
+    section(ui, "Picture", |ui| picture(ui, &mut new));
+    section(ui, "Sampling", |ui| sampling(ui, &mut new));
+    section(ui, "While moving", |ui| moving(cx, ui, &mut new));
+    if new != old {
+        cx.session.set_settings(new);
+    }
+}
+
+/// A menu of pipelines.
+pub fn pipeline_menu(ui: &mut Ui, pipeline: &mut Pipeline) {
+    egui::ComboBox::from_id_salt("pipeline").selected_text(pipeline_name(*pipeline)).width(104.0).show_ui(ui, |ui| {
+        for choice in Pipeline::ALL {
+            ui.selectable_value(pipeline, choice, pipeline_name(choice)).on_hover_text(pipeline_tip(choice));
+        }
+    });
+}
+
+/// A menu of what is shown.
+pub fn show_menu(ui: &mut Ui, show: &mut Show) {
+    let name = Show::ALL.iter().find(|(choice, _)| choice == show).map_or("", |(_, name)| name);
+    egui::ComboBox::from_id_salt("show").selected_text(name).width(128.0).height(420.0).show_ui(ui, |ui| {
+        for (choice, name) in Show::ALL {
+            ui.selectable_value(show, choice, name);
+        }
+    });
+}
+
+fn pipeline_name(pipeline: Pipeline) -> String {
+    let name = pipeline.name();
+    let mut letters = name.chars();
+    letters.next().map(|first| first.to_uppercase().collect::<String>() + letters.as_str()).unwrap_or_default()
+}
+
+fn pipeline_tip(pipeline: Pipeline) -> &'static str {
+    match pipeline {
+        Pipeline::Raster => "Rasterised surfaces, deferred shading, no rays",
+        Pipeline::Hybrid => "Rasterised surfaces, ray-traced shadows, reflections and refractions",
+        Pipeline::Raytraced => "The same with ray-traced first surfaces",
+        #[expect(unreachable_patterns, reason = "pipelines are still being added")]
+        _ => "",
+    }
+}
+
+fn picture(ui: &mut Ui, settings: &mut ViewSettings) {
+    field(ui, "Pipeline", "How the picture is made", |ui| pipeline_menu(ui, &mut settings.pipeline));
+    field(ui, "Show", "The finished picture or a step on the way", |ui| show_menu(ui, &mut settings.show));
+    field(ui, "Exposure", "Stops: each doubles the light. The picture is not rendered anew", |ui| {
+        ui.spacing_mut().slider_width = (ui.available_width() - 80.0).clamp(40.0, 200.0);
+        ui.add(Slider::new(&mut settings.exposure_ev, -10.0..=10.0).max_decimals(2).suffix(" EV"));
+    });
+    field(ui, "Tone map", "How radiance becomes a colour that a screen can show", |ui| {
+        egui::ComboBox::from_id_salt("tone map").selected_text(tone_name(settings.tone_map)).show_ui(ui, |ui| {
+            for choice in ToneMap::ALL {
+                ui.selectable_value(&mut settings.tone_map, choice, tone_name(choice));
+            }
+        });
+    });
+}
+
+fn tone_name(tone_map: ToneMap) -> &'static str {
+    match tone_map {
+        ToneMap::Linear => "Linear",
+        ToneMap::Aces => "ACES",
+        ToneMap::Agx => "AgX",
+        ToneMap::Neutral => "Neutral",
+    }
+}
+
+fn sampling(ui: &mut Ui, settings: &mut ViewSettings) {
+    field(ui, "Lights a pixel", "All lights when there are at most this many, else a random choice", |ui| {
+        ui.add(DragValue::new(&mut settings.light_samples).range(1..=64).speed(0.1));
+    });
+    field(ui, "Shadow rays", "For each light and pixel of a frame; more is smoother and slower", |ui| {
+        ui.add(DragValue::new(&mut settings.shadow_rays).range(1..=64).speed(0.1));
+    });
+    field(ui, "Depth", "Reflections and refractions after the first surface", |ui| {
+        ui.add(DragValue::new(&mut settings.max_depth).range(0..=64).speed(0.1));
+    });
+    field(ui, "Rough limit", "Surfaces rougher than this reflect the environment only", |ui| {
+        ui.add(DragValue::new(&mut settings.reflection_roughness_max).range(0.0..=1.0).speed(0.005));
+    });
+    field(ui, "Glass shadows", "Light passes glass, tinted and unbent, or stops at it", |ui| {
+        let mut tinted = !settings.opaque_glass_shadows;
+        ui.checkbox(&mut tinted, "tinted");
+        settings.opaque_glass_shadows = !tinted;
+    });
+    field(ui, "Seed", "Of all random numbers: the same seed gives the same picture", |ui| {
+        ui.add(DragValue::new(&mut settings.seed).speed(0.1));
+    });
+    field(ui, "Left out", "Do not run what this scene does not need; the picture stays the same", |ui| {
+        let mut lean = settings.needs == NeedsMode::Auto;
+        ui.checkbox(&mut lean, "what is not needed");
+        settings.needs = if lean { NeedsMode::Auto } else { NeedsMode::All };
+    });
+}
+
+fn moving(cx: &mut Cx<'_>, ui: &mut Ui, settings: &mut ViewSettings) {
+    field(ui, "Denoise", "Use earlier frames while something moves", |ui| {
+        ui.checkbox(&mut settings.temporal, "over time");
+    });
+    let config = &mut cx.state.config;
+    field(ui, "Resolution", "Lower it while something moves, so that a frame takes at most this long", |ui| {
+        ui.checkbox(&mut config.adaptive, "");
+        let drag = DragValue::new(&mut config.target_frame_ms).range(4.0..=500.0).speed(0.5).max_decimals(0).suffix(" ms");
+        ui.add_enabled(config.adaptive, drag);
+    });
+}

@@ -1,0 +1,143 @@
+//! What a session opens and imports. Enters: a path. Leaves: a document, or an edit that brings a model in.
+//! Loading touches no session and may run on a worker.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, bail};
+use caustica_renderer::ViewSettings;
+use caustica_scene::import::{self, ImportOptions, Imported};
+use caustica_scene::{
+    Document, Edit, Environment, EnvironmentFile, Local, NodeId, Project, ProjectMeta, RadianceMap,
+};
+
+use super::camera::ViewCamera;
+
+/// Key of the camera in the project's view settings.
+const CAMERA_KEY: &str = "camera";
+
+/// What a file held.
+#[derive(Clone, Debug)]
+pub enum Loaded {
+    /// A project.
+    Project(Box<Project>),
+    /// A model: glTF, GLB or OBJ.
+    Model(Box<Imported>),
+    /// An environment map.
+    Environment(PathBuf, Arc<RadianceMap>),
+}
+
+/// Reads a project, a model or an environment, by the ending of its name. `progress`: step and share done.
+///
+/// # Errors
+/// When the file cannot be read, with file, place and reason.
+pub fn load(path: &Path, progress: &dyn Fn(&str, f32)) -> anyhow::Result<Loaded> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if Project::is_project_path(path) {
+        let project = Project::load_with_progress(path, &ImportOptions::default(), progress)?;
+        project.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+        return Ok(Loaded::Project(Box::new(project)));
+    }
+    match ending.as_str() {
+        "gltf" | "glb" | "obj" => {
+            let imported = import::load_with_progress(path, &ImportOptions::default(), progress)?;
+            imported.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+            Ok(Loaded::Model(Box::new(imported)))
+        }
+        "hdr" | "exr" => {
+            let (map, warnings) = import::load_environment(path)?;
+            warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+            Ok(Loaded::Environment(path.to_owned(), Arc::new(map)))
+        }
+        _ => bail!(
+            "{}: neither a project (.caustica.json) nor a model (.gltf, .glb, .obj) nor an environment (.hdr, .exr)",
+            path.display()
+        ),
+    }
+}
+
+/// A document that was opened.
+pub(super) struct Opened {
+    pub(super) document: Document,
+    pub(super) meta: ProjectMeta,
+    pub(super) path: Option<PathBuf>,
+    pub(super) camera: Option<ViewCamera>,
+    pub(super) settings: Option<ViewSettings>,
+}
+
+/// Makes a document of what was loaded.
+pub(super) fn open(path: &Path, loaded: Loaded) -> anyhow::Result<Opened> {
+    match loaded {
+        Loaded::Project(project) => {
+            let Project { document, meta, .. } = *project;
+            let camera = meta.view.get(CAMERA_KEY).and_then(|v| serde_json::from_value(v.clone()).ok());
+            let settings = (!meta.render.is_empty())
+                .then(|| serde_json::from_value(serde_json::Value::Object(meta.render.clone())));
+            let settings = settings.and_then(|read| {
+                read.inspect_err(|error| tracing::warn!("{}: render settings: {error}", path.display())).ok()
+            });
+            Ok(Opened { document, meta, path: Some(path.to_owned()), camera, settings })
+        }
+        other => {
+            let mut document = Document::new();
+            let brought = import(&mut document, other)?;
+            document.apply(brought.edit)?;
+            Ok(Opened { document, meta: ProjectMeta::default(), path: None, camera: None, settings: None })
+        }
+    }
+}
+
+/// An edit that brings something in, and the node that it makes.
+pub(super) struct Brought {
+    pub(super) edit: Edit,
+    pub(super) node: Option<NodeId>,
+}
+
+/// Makes the edit that brings a model or an environment into a document.
+pub(super) fn import(document: &mut Document, loaded: Loaded) -> anyhow::Result<Brought> {
+    match loaded {
+        Loaded::Project(_) => bail!("a project can be opened, not imported"),
+        Loaded::Model(imported) => {
+            let name = imported.prefab.name.clone();
+            let (prefab, add) = document.import_edit(*imported);
+            let (node, place) = document.instantiate_edit(prefab, None, Local::default());
+            Ok(Brought { edit: Edit::batch(format!("imported {name}"), vec![add, place]), node: Some(node) })
+        }
+        Loaded::Environment(path, map) => {
+            let file = EnvironmentFile { path, rotation_rad: 0.0, scale: 1.0, map: Some(map) };
+            Ok(Brought { edit: Edit::SetEnvironment(Environment::File(file)), node: None })
+        }
+    }
+}
+
+/// Writes camera and settings into what is saved.
+pub(super) fn note_view(meta: &mut ProjectMeta, camera: &ViewCamera, settings: &ViewSettings) {
+    if let Ok(value) = serde_json::to_value(camera) {
+        meta.view.insert(String::from(CAMERA_KEY), value);
+    }
+    if let Ok(serde_json::Value::Object(map)) = serde_json::to_value(settings) {
+        for (key, value) in map {
+            meta.render.insert(key, value);
+        }
+    }
+}
+
+/// Sets an environment from the command line: a file, or three numbers.
+///
+/// # Errors
+/// When it is neither.
+pub fn environment_argument(text: &str) -> anyhow::Result<Environment> {
+    let numbers: Vec<f32> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    if let [r, g, b] = numbers[..]
+        && text.split(',').count() == 3
+    {
+        if [r, g, b].iter().any(|v| !v.is_finite() || *v < 0.0) {
+            bail!("--environment {text}: radiance must be finite and not negative");
+        }
+        return Ok(Environment::Constant(glam::Vec3::new(r, g, b)));
+    }
+    let path = Path::new(text);
+    let (map, _) = import::load_environment(path).with_context(|| format!("--environment {text}"))?;
+    let map = Some(Arc::new(map));
+    Ok(Environment::File(EnvironmentFile { path: path.to_owned(), rotation_rad: 0.0, scale: 1.0, map }))
+}

@@ -1,0 +1,183 @@
+//! One value of the document as the renderer wants it. Positions are taken off the render origin in double precision
+//! before they become single.
+
+use std::sync::Arc;
+
+use caustica_renderer::delta;
+use caustica_scene::{self as scene, LightKind, Placed, Target};
+use glam::{Affine3A, DAffine3, DMat3, DVec3, Vec3};
+
+use crate::default_sky::default_sky;
+
+/// Id of the instance or light that a target brings.
+pub fn instance_id(target: Target) -> delta::InstanceId {
+    delta::InstanceId { node: target.node.0, part: target.part.unwrap_or(0) }
+}
+
+/// World space to render space, then to single precision.
+pub fn render_from(world: &DAffine3, origin: DVec3) -> Affine3A {
+    let m: DMat3 = world.matrix3;
+    Affine3A::from_mat3_translation(m.as_mat3(), (world.translation - origin).as_vec3())
+}
+
+/// A camera of the document, or of the editor, as the renderer wants it.
+pub fn camera_of(
+    world_from_camera: &DAffine3,
+    projection: scene::Projection,
+    near_m: f64,
+    origin: DVec3,
+) -> delta::Camera {
+    delta::Camera {
+        render_from_camera: render_from(&scene::rigid(world_from_camera), origin),
+        projection: match projection {
+            scene::Projection::Perspective { yfov_rad } => delta::Projection::Perspective { yfov_rad },
+            scene::Projection::Orthographic { ymag_m } => delta::Projection::Orthographic { ymag_m },
+        },
+        near_m: near_m as f32,
+    }
+}
+
+/// A mesh with its primitives.
+pub fn mesh_of(mesh: &scene::Mesh) -> delta::Mesh {
+    let data = &mesh.data;
+    delta::Mesh {
+        name: mesh.name.clone(),
+        positions: data.positions.clone(),
+        normals: data.normals.clone(),
+        tangents: data.tangents.clone(),
+        tex_coords0: data.tex_coords0.clone(),
+        tex_coords1: data.tex_coords1.clone(),
+        colors: data.colors.clone(),
+        indices: data.indices.clone(),
+        geometries: mesh
+            .primitives
+            .iter()
+            .map(|primitive| delta::Geometry {
+                first_index: primitive.first_index,
+                index_count: primitive.index_count,
+                mesh_from_primitive: render_from(&primitive.mesh_from_primitive, DVec3::ZERO),
+            })
+            .collect(),
+    }
+}
+
+/// A texture.
+pub fn texture_of(texture: &scene::Texture) -> delta::Texture {
+    let wrap = |wrap| match wrap {
+        scene::Wrap::Repeat => delta::Wrap::Repeat,
+        scene::Wrap::MirroredRepeat => delta::Wrap::MirroredRepeat,
+        scene::Wrap::ClampToEdge => delta::Wrap::ClampToEdge,
+    };
+    let sampler = &texture.sampler;
+    delta::Texture {
+        name: texture.name.clone(),
+        width: texture.width,
+        height: texture.height,
+        rgba8: texture.rgba8.to_vec(),
+        srgb: texture.srgb,
+        sampler: delta::Sampler {
+            wrap_u: wrap(sampler.wrap_u),
+            wrap_v: wrap(sampler.wrap_v),
+            mag_linear: sampler.mag_linear,
+            min_linear: sampler.min_linear,
+            mip_linear: sampler.mip_linear,
+            mipmaps: sampler.mipmaps,
+        },
+    }
+}
+
+/// A material.
+pub fn material_of(material: &scene::Material) -> delta::Material {
+    let texture = |used: &Option<scene::TextureUse>| {
+        used.map(|used| delta::TextureUse {
+            texture: delta::TextureId(used.texture.0),
+            tex_coord: used.tex_coord,
+            offset: used.offset,
+            rotation_rad: used.rotation_rad,
+            scale: used.scale,
+        })
+    };
+    delta::Material {
+        mode: match material.mode {
+            scene::ShadingMode::Pbr => delta::ShadingMode::Pbr,
+            scene::ShadingMode::Reflective => delta::ShadingMode::Reflective,
+            scene::ShadingMode::Refractive => delta::ShadingMode::Refractive,
+            scene::ShadingMode::Unlit => delta::ShadingMode::Unlit,
+        },
+        base_color: material.base_color,
+        base_color_texture: texture(&material.base_color_texture),
+        metallic: material.metallic,
+        roughness: material.roughness,
+        metallic_roughness_texture: texture(&material.metallic_roughness_texture),
+        normal_texture: texture(&material.normal_texture),
+        normal_scale: material.normal_scale,
+        occlusion_texture: texture(&material.occlusion_texture),
+        occlusion_strength: material.occlusion_strength,
+        emissive: material.emitted_radiance(),
+        emissive_texture: texture(&material.emissive_texture),
+        ior: material.ior,
+        specular: material.specular,
+        specular_color: material.specular_color,
+        transmission: material.transmission,
+        has_volume: material.has_volume,
+        attenuation_color: material.attenuation_color,
+        attenuation_distance_m: material.attenuation_distance_m.unwrap_or(f32::INFINITY),
+        alpha: match material.alpha {
+            scene::AlphaMode::Opaque => delta::AlphaMode::Opaque,
+            scene::AlphaMode::Mask { cutoff } => delta::AlphaMode::Mask { cutoff },
+            scene::AlphaMode::Blend => delta::AlphaMode::Blend,
+        },
+        double_sided: material.double_sided,
+    }
+}
+
+/// A light at its place; it shines along its node's -Z. The node's scale does not act on its size.
+pub fn light_of(light: &Placed<scene::Light>, origin: DVec3) -> delta::Light {
+    let place = scene::rigid(&light.world_from_node);
+    let position = (place.translation - origin).as_vec3();
+    let direction = place.transform_vector3(DVec3::NEG_Z).as_vec3().try_normalize().unwrap_or(Vec3::NEG_Y);
+    let radiant = light.value.radiant().max(Vec3::ZERO);
+    let limit = |range: Option<f32>| range.unwrap_or(f32::INFINITY);
+    match light.value.kind {
+        LightKind::Point { radius_m, range_m } => {
+            delta::Light::Point { position, intensity: radiant, radius_m, range_m: limit(range_m) }
+        }
+        LightKind::Spot { radius_m, range_m, inner_rad, outer_rad } => delta::Light::Spot {
+            position,
+            direction,
+            intensity: radiant,
+            radius_m,
+            range_m: limit(range_m),
+            cos_inner: inner_rad.cos(),
+            cos_outer: outer_rad.cos(),
+        },
+        LightKind::Directional { angular_radius_rad } => {
+            delta::Light::Directional { direction, irradiance: radiant, angular_radius_rad }
+        }
+    }
+}
+
+/// What surrounds the scene. A file that could not be read is black.
+pub fn environment_of(environment: &scene::Environment) -> delta::Environment {
+    match environment {
+        scene::Environment::Constant(radiance) => delta::Environment::Constant(*radiance),
+        scene::Environment::Auto | scene::Environment::DefaultSky => delta::Environment::Equirectangular {
+            map: Arc::new(default_sky()),
+            rotation_rad: 0.0,
+            scale: 1.0,
+        },
+        scene::Environment::File(file) => match &file.map {
+            Some(map) => delta::Environment::Equirectangular {
+                map: Arc::new(delta::RadianceMap {
+                    name: map.name.clone(),
+                    width: map.width,
+                    height: map.height,
+                    rgb: map.rgb.clone(),
+                }),
+                rotation_rad: file.rotation_rad,
+                scale: file.scale,
+            },
+            None => delta::Environment::Constant(Vec3::ZERO),
+        },
+    }
+}

@@ -1,0 +1,194 @@
+//! What is kept between runs: theme, recent files, size of the window, where the panels are.
+//! Enters and leaves: `caustica/layout.json` in the user's configuration folder. A bad file is told of and ignored.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use egui_dock::{DockState, NodeIndex};
+use serde::{Deserialize, Serialize};
+
+/// Most files in File > Open recent.
+const MOST_RECENT: usize = 12;
+
+/// A panel that can be docked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Tab {
+    /// The picture.
+    View,
+    /// The tree of the scene.
+    Outliner,
+    /// The selected object.
+    Inspector,
+    /// Environment and settings of the view.
+    Render,
+    /// Milliseconds of each pass.
+    Passes,
+    /// What this scene does not need.
+    LeftOut,
+    /// Findings of the audit.
+    Health,
+    /// The log.
+    Log,
+}
+
+impl Tab {
+    /// Every panel, in the order of the menu.
+    pub const ALL: [Self; 8] = [
+        Self::View,
+        Self::Outliner,
+        Self::Inspector,
+        Self::Render,
+        Self::Passes,
+        Self::LeftOut,
+        Self::Health,
+        Self::Log,
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::View => "View",
+            Self::Outliner => "Outliner",
+            Self::Inspector => "Inspector",
+            Self::Render => "Render",
+            Self::Passes => "Passes",
+            Self::LeftOut => "Left out",
+            Self::Health => "Health",
+            Self::Log => "Log",
+        }
+    }
+}
+
+/// The view in the middle, the tree to the left, the inspector to the right, reports below.
+pub fn default_layout() -> DockState<Tab> {
+    let mut dock = DockState::new(vec![Tab::View]);
+    let tree = dock.main_surface_mut();
+    let [rest, _right] = tree.split_right(NodeIndex::root(), 0.78, vec![Tab::Inspector, Tab::Render]);
+    let [rest, _left] = tree.split_left(rest, 0.22, vec![Tab::Outliner]);
+    let [_view, _below] = tree.split_below(rest, 0.76, vec![Tab::Passes, Tab::LeftOut, Tab::Health, Tab::Log]);
+    dock
+}
+
+/// What is kept between runs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Config {
+    /// Dark or light.
+    pub dark: bool,
+    /// Files opened last, newest first.
+    pub recent: Vec<PathBuf>,
+    /// Size of the window, points.
+    pub window: [f32; 2],
+    /// Frame time that the resolution follows while something moves.
+    pub target_frame_ms: f32,
+    /// Lower the resolution while something moves.
+    pub adaptive: bool,
+    /// Where the panels are.
+    pub layout: Option<DockState<Tab>>,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            dark: true,
+            recent: Vec::new(),
+            window: [1600.0, 960.0],
+            target_frame_ms: 33.0,
+            adaptive: true,
+            layout: None,
+        }
+    }
+}
+
+impl Config {
+    /// Reads what was kept; the defaults where nothing was, or when it cannot be read, which is told.
+    pub fn load() -> Self {
+        let Some(path) = path() else { return Self::default() };
+        match std::fs::read_to_string(&path) {
+            Ok(text) => Self::parse(&text).unwrap_or_else(|error| {
+                tracing::warn!("{}: {error}; the default layout is used", path.display());
+                Self::default()
+            }),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Self::default(),
+            Err(error) => {
+                tracing::warn!("{}: {error}; the default layout is used", path.display());
+                Self::default()
+            }
+        }
+    }
+
+    fn parse(text: &str) -> serde_json::Result<Self> {
+        let mut config: Self = serde_json::from_str(text)?;
+        // A layout without a view is of no use.
+        config.layout = config.layout.filter(|dock| dock.iter_all_tabs().any(|(_, tab)| *tab == Tab::View));
+        config.window = config.window.map(|side| if side.is_finite() { side.clamp(480.0, 16_384.0) } else { 960.0 });
+        config.recent.truncate(MOST_RECENT);
+        Ok(config)
+    }
+
+    /// Writes it, whole or not at all.
+    ///
+    /// # Errors
+    /// With the file's name when it cannot be written.
+    pub fn save(&self) -> anyhow::Result<()> {
+        let Some(path) = path() else { return Ok(()) };
+        let text = serde_json::to_string_pretty(self).context("writing the layout")?;
+        let folder = path.parent().unwrap_or(Path::new("."));
+        std::fs::create_dir_all(folder).with_context(|| format!("making {}", folder.display()))?;
+        let beside = path.with_extension("json.new");
+        std::fs::write(&beside, text).with_context(|| format!("writing {}", beside.display()))?;
+        std::fs::rename(&beside, &path).with_context(|| format!("writing {}", path.display()))
+    }
+
+    /// Puts a file first among the recent ones.
+    pub fn remember(&mut self, path: &Path) {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+        self.recent.retain(|known| *known != path);
+        self.recent.insert(0, path);
+        self.recent.truncate(MOST_RECENT);
+    }
+}
+
+fn path() -> Option<PathBuf> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let folder = set("XDG_CONFIG_HOME").or_else(|| set("HOME").map(|home| home.join(".config")))?;
+    Some(folder.join("caustica").join("layout.json"))
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use super::*;
+
+    #[test]
+    fn a_layout_survives_its_file() {
+        let mut config = Config { layout: Some(default_layout()), dark: false, ..Config::default() };
+        config.remember(Path::new("/scenes/a.glb"));
+        let again = Config::parse(&serde_json::to_string(&config).unwrap()).unwrap();
+        assert!(!again.dark);
+        assert_eq!(again.recent, config.recent);
+        let mut tabs: Vec<_> = again.layout.unwrap().iter_all_tabs().map(|(_, tab)| *tab).collect();
+        tabs.sort();
+        assert_eq!(tabs, Tab::ALL);
+    }
+
+    #[test]
+    fn nonsense_is_an_error_and_odd_values_are_mended() {
+        assert!(Config::parse("[]").is_err());
+        let odd = Config::parse(r#"{"window": [1e9, -5.0], "unknown": 1}"#).unwrap();
+        assert_eq!(odd.window, [16_384.0, 480.0]);
+    }
+
+    #[test]
+    fn recent_files_are_few_and_unlike() {
+        let mut config = Config::default();
+        for n in 0..20 {
+            config.remember(Path::new(&format!("/scenes/{n}.glb")));
+        }
+        config.remember(Path::new("/scenes/15.glb"));
+        assert_eq!(config.recent.len(), MOST_RECENT);
+        assert_eq!(config.recent[0], Path::new("/scenes/15.glb"));
+        assert_eq!(config.recent.iter().filter(|path| path.ends_with("15.glb")).count(), 1);
+    }
+}

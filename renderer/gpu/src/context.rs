@@ -1,0 +1,284 @@
+//! The logical device: features, extension functions, limits, the queue and its timeline semaphore.
+//! Enters: an instance and a chosen physical device. Leaves: the `Device` that every other object holds an Arc of.
+
+use std::mem::ManuallyDrop;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use ash::{ext, khr, vk};
+use gpu_allocator::vulkan::Allocator;
+
+use crate::barrier::Tracker;
+use crate::device_choice::{self, Candidate, DeviceKind, REQUIRED_EXTENSIONS, Requirements};
+use crate::error::{Context, GpuError};
+use crate::instance::Instance;
+use crate::retire::RetireQueue;
+use crate::{Result, memory};
+
+/// How to open a device.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceOptions {
+    /// Which one.
+    pub requirements: Requirements,
+    /// Refuse allocations past this many bytes in total; `None`: only the driver's budget.
+    pub memory_limit_bytes: Option<u64>,
+}
+
+/// What the device allows; never hard-coded elsewhere.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Alignment of the scratch buffer of an acceleration structure build, bytes.
+    pub scratch_alignment: u64,
+    /// Size of a shader group handle, bytes.
+    pub group_handle_size: u32,
+    /// Alignment of a handle inside a shader binding table, bytes.
+    pub group_handle_alignment: u32,
+    /// Alignment of the start of a shader binding table region, bytes.
+    pub group_base_alignment: u32,
+    /// Nanoseconds in one tick of a timestamp.
+    pub timestamp_period_ns: f32,
+    /// Largest side of a 2D image, texels.
+    pub max_image_extent: u32,
+    /// Largest anisotropy of a sampler.
+    pub max_anisotropy: f32,
+    /// Largest bindless texture array.
+    pub max_textures: u32,
+    /// Most instances in a TLAS.
+    pub max_instances: u64,
+    /// Most geometries in a BLAS.
+    pub max_geometries: u64,
+    /// Most primitives in a BLAS.
+    pub max_primitives: u64,
+    /// Bytes of push constants.
+    pub max_push_constants: u32,
+}
+
+/// A device with one queue for graphics, compute and transfer.
+pub struct Device {
+    pub(crate) raw: ash::Device,
+    pub(crate) accel_fns: khr::acceleration_structure::Device,
+    pub(crate) rt_fns: khr::ray_tracing_pipeline::Device,
+    pub(crate) push_fns: khr::push_descriptor::Device,
+    pub(crate) swapchain_fns: Option<khr::swapchain::Device>,
+    pub(crate) debug_utils: Option<ext::debug_utils::Device>,
+    pub(crate) allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
+    pub(crate) memory: memory::Ledger,
+    pub(crate) queue: Mutex<vk::Queue>,
+    pub(crate) timeline: vk::Semaphore,
+    pub(crate) submitted: AtomicU64,
+    pub(crate) retired: RetireQueue,
+    pub(crate) tracker: Mutex<Tracker>,
+    next_resource: AtomicU64,
+    pipeline_cache: vk::PipelineCache,
+    limits: Limits,
+    candidate: Candidate,
+    instance: Arc<Instance>,
+}
+
+impl Device {
+    /// Opens the device that `options` names, or the best suitable one.
+    ///
+    /// # Errors
+    /// [`GpuError::NoDevice`] with the reason for each refusal; [`GpuError::Vulkan`] when the driver refuses.
+    pub fn new(instance: &Arc<Instance>, options: &DeviceOptions) -> Result<Arc<Self>> {
+        let candidate = device_choice::choose(instance, &options.requirements)?;
+        let raw = create(instance, &candidate)?;
+        // SAFETY: the queue family and index 0 were asked for at creation.
+        let queue = unsafe { raw.get_device_queue(candidate.queue_family, 0) };
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        // SAFETY: plain creation on a live device; destroyed in Drop.
+        let timeline =
+            unsafe { raw.create_semaphore(&vk::SemaphoreCreateInfo::default().push_next(&mut kind), None) }
+                .during("vkCreateSemaphore")?;
+        // SAFETY: as above.
+        let pipeline_cache =
+            unsafe { raw.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }
+                .during("vkCreatePipelineCache")?;
+        let allocator = memory::create_allocator(instance, &raw, candidate.physical)?;
+        let fns = &instance.raw;
+        Ok(Arc::new(Self {
+            accel_fns: khr::acceleration_structure::Device::new(fns, &raw),
+            rt_fns: khr::ray_tracing_pipeline::Device::new(fns, &raw),
+            push_fns: khr::push_descriptor::Device::new(fns, &raw),
+            swapchain_fns: candidate.swapchain.then(|| khr::swapchain::Device::new(fns, &raw)),
+            debug_utils: instance.debug_utils.then(|| ext::debug_utils::Device::new(fns, &raw)),
+            allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
+            memory: memory::Ledger::new(options.memory_limit_bytes),
+            queue: Mutex::new(queue),
+            timeline,
+            submitted: AtomicU64::new(0),
+            retired: RetireQueue::default(),
+            tracker: Mutex::new(Tracker::default()),
+            next_resource: AtomicU64::new(1),
+            pipeline_cache,
+            limits: limits_of(fns, candidate.physical),
+            candidate,
+            raw,
+            instance: Arc::clone(instance),
+        }))
+    }
+
+    /// Limits of the device.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Name of the device.
+    pub fn name(&self) -> &str {
+        &self.candidate.name
+    }
+
+    /// Name and version of the driver.
+    pub fn driver(&self) -> &str {
+        &self.candidate.driver
+    }
+
+    /// Kind of the device.
+    pub fn kind(&self) -> DeviceKind {
+        self.candidate.kind
+    }
+
+    /// The instance it belongs to.
+    pub fn instance(&self) -> &Arc<Instance> {
+        &self.instance
+    }
+
+    /// Whether VK_EXT_memory_budget is there.
+    pub(crate) fn has_memory_budget(&self) -> bool {
+        self.candidate.memory_budget
+    }
+
+    pub(crate) fn physical(&self) -> vk::PhysicalDevice {
+        self.candidate.physical
+    }
+
+    pub(crate) fn queue_family(&self) -> u32 {
+        self.candidate.queue_family
+    }
+
+    pub(crate) fn cache(&self) -> vk::PipelineCache {
+        self.pipeline_cache
+    }
+
+    /// A number for a resource or a group of resources that the barrier tracker follows.
+    pub fn new_resource_id(&self) -> crate::ResourceId {
+        crate::ResourceId(self.next_resource.fetch_add(1, Ordering::Relaxed))
+    }
+
+    /// The timeline value that the device has reached.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn completed(&self) -> Result<u64> {
+        // SAFETY: the semaphore lives as long as the device.
+        unsafe { self.raw.get_semaphore_counter_value(self.timeline) }.during("vkGetSemaphoreCounterValue")
+    }
+
+    /// Waits until the timeline has reached `value`.
+    ///
+    /// # Errors
+    /// [`GpuError::Timeout`] after `seconds`; [`GpuError::DeviceLost`].
+    pub fn wait_for(&self, value: u64, seconds: u64) -> Result<()> {
+        let (semaphores, values) = ([self.timeline], [value]);
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the semaphore lives as long as the device.
+        match unsafe { self.raw.wait_semaphores(&info, seconds.saturating_mul(1_000_000_000)) } {
+            Err(vk::Result::TIMEOUT) => {
+                Err(GpuError::Timeout { seconds, last_pass: String::from("unknown") })
+            }
+            other => other.during("vkWaitSemaphores"),
+        }
+    }
+
+    /// Waits for all submitted work and destroys what was dropped meanwhile. For the end of the program, tests and
+    /// the user-interface renderer; never called in a frame.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn wait_idle(&self) -> Result<()> {
+        let _queue = self.queue.lock();
+        // SAFETY: the queue is locked, so nobody submits meanwhile.
+        unsafe { self.raw.device_wait_idle() }.during("vkDeviceWaitIdle")?;
+        self.retired.collect(self, u64::MAX);
+        Ok(())
+    }
+
+    /// The raw device, for the one user-interface renderer that takes raw handles.
+    pub fn raw(&self) -> &ash::Device {
+        &self.raw
+    }
+
+    /// The shared allocator, for the one user-interface renderer that needs it.
+    pub fn allocator(&self) -> Arc<Mutex<Allocator>> {
+        Arc::clone(&self.allocator)
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: every object that uses the device holds an Arc of it, so this is the last use; after the wait no
+        // work is pending. The allocator goes before the device, once.
+        unsafe {
+            if let Err(error) = self.raw.device_wait_idle() {
+                tracing::error!("waiting for the device at the end failed: {error}");
+            }
+            self.retired.collect(self, u64::MAX);
+            self.raw.destroy_pipeline_cache(self.pipeline_cache, None);
+            self.raw.destroy_semaphore(self.timeline, None);
+            ManuallyDrop::drop(&mut self.allocator);
+            self.raw.destroy_device(None);
+        }
+    }
+}
+
+fn create(instance: &Instance, candidate: &Candidate) -> Result<ash::Device> {
+    let mut extensions: Vec<_> = REQUIRED_EXTENSIONS.iter().map(|(name, _)| name.as_ptr()).collect();
+    if candidate.memory_budget {
+        extensions.push(ext::memory_budget::NAME.as_ptr());
+    }
+    if candidate.swapchain && instance.surface_fns.is_some() {
+        extensions.push(khr::swapchain::NAME.as_ptr());
+    }
+    let priorities = [1.0];
+    let queues = [vk::DeviceQueueCreateInfo::default()
+        .queue_family_index(candidate.queue_family)
+        .queue_priorities(&priorities)];
+    let (device, _) = device_choice::with_features(true, |features| {
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
+            .push_next(features);
+        // SAFETY: every pointer in `info` lives until the call returns; features and extensions were checked.
+        unsafe { instance.raw.create_device(candidate.physical, &info, None) }
+    });
+    device.during("vkCreateDevice")
+}
+
+fn limits_of(fns: &ash::Instance, physical: vk::PhysicalDevice) -> Limits {
+    let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+    let mut rt = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
+    let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
+    let mut head =
+        vk::PhysicalDeviceProperties2::default().push_next(&mut accel).push_next(&mut rt).push_next(&mut v12);
+    // SAFETY: the extensions that define the structures were checked when the device was chosen.
+    unsafe { fns.get_physical_device_properties2(physical, &mut head) };
+    let core = head.properties.limits;
+    Limits {
+        scratch_alignment: u64::from(accel.min_acceleration_structure_scratch_offset_alignment),
+        group_handle_size: rt.shader_group_handle_size,
+        group_handle_alignment: rt.shader_group_handle_alignment,
+        group_base_alignment: rt.shader_group_base_alignment,
+        timestamp_period_ns: core.timestamp_period,
+        max_image_extent: core.max_image_dimension2_d,
+        max_anisotropy: core.max_sampler_anisotropy,
+        max_textures: v12
+            .max_per_stage_descriptor_update_after_bind_sampled_images
+            .min(v12.max_per_stage_descriptor_update_after_bind_samplers)
+            .min(v12.max_descriptor_set_update_after_bind_sampled_images)
+            .min(16_384),
+        max_instances: accel.max_instance_count,
+        max_geometries: accel.max_geometry_count,
+        max_primitives: accel.max_primitive_count,
+        max_push_constants: core.max_push_constants_size,
+    }
+}

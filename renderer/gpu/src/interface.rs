@@ -1,0 +1,79 @@
+//! What a pipeline binds in set 1, as reflected from its SPIR-V, and what the host gives for each name.
+
+use ash::vk;
+
+use crate::accel::AccelStructure;
+use crate::barrier::Access;
+use crate::buffer::Buffer;
+use crate::image::Image;
+use crate::sampler::Sampler;
+
+/// What kind of descriptor a binding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BindingKind {
+    /// `texture2D`: fetched without a sampler.
+    SampledImage,
+    /// `sampler2D`.
+    CombinedImage,
+    /// `image2D`, with what the shader does to it.
+    StorageImage(Access),
+    /// Storage buffer, with what the shader does to it.
+    StorageBuffer(Access),
+    /// Acceleration structure.
+    AccelStructure,
+}
+
+impl BindingKind {
+    pub(crate) fn descriptor(self) -> vk::DescriptorType {
+        match self {
+            Self::SampledImage => vk::DescriptorType::SAMPLED_IMAGE,
+            Self::CombinedImage => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+            Self::StorageImage(_) => vk::DescriptorType::STORAGE_IMAGE,
+            Self::StorageBuffer(_) => vk::DescriptorType::STORAGE_BUFFER,
+            Self::AccelStructure => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
+        }
+    }
+
+    pub(crate) fn access(self) -> Access {
+        match self {
+            Self::SampledImage | Self::CombinedImage => Access::Sampled,
+            Self::StorageImage(access) | Self::StorageBuffer(access) => access,
+            Self::AccelStructure => Access::AccelTrace,
+        }
+    }
+}
+
+/// One variable of set 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Binding {
+    /// Name in GLSL.
+    pub name: String,
+    /// Its number.
+    pub binding: u32,
+    /// Its kind.
+    pub kind: BindingKind,
+}
+
+/// What a pipeline needs from the host.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Interface {
+    /// Set 1, by name.
+    pub bindings: Vec<Binding>,
+    /// Whether the pipeline uses set 0, the scene.
+    pub uses_scene: bool,
+    /// Bytes of push constants.
+    pub push_bytes: u32,
+}
+
+/// What the host gives for a binding.
+#[derive(Clone, Copy)]
+pub enum Bind<'a> {
+    /// An image, for `texture2D` or `image2D`.
+    Image(&'a Image),
+    /// An image with a sampler, for `sampler2D`.
+    Combined(&'a Image, &'a Sampler),
+    /// A whole buffer.
+    Buffer(&'a Buffer),
+    /// An acceleration structure.
+    Accel(&'a AccelStructure),
+}

@@ -1,0 +1,121 @@
+//! Objects die here: each dropped object waits for the timeline value of the work that may still use it.
+
+use std::collections::VecDeque;
+use std::sync::Mutex;
+use std::sync::atomic::Ordering;
+
+use ash::vk;
+
+use crate::barrier::ResourceId;
+use crate::context::Device;
+use crate::memory::Memory;
+
+/// A Vulkan object that nobody will use in new work.
+pub(crate) enum Garbage {
+    Buffer(vk::Buffer, Memory, ResourceId),
+    Image(vk::Image, Vec<vk::ImageView>, Memory, ResourceId),
+    Sampler(vk::Sampler),
+    AccelStructure(vk::AccelerationStructureKHR),
+    Pipeline(vk::Pipeline, vk::PipelineLayout, Vec<vk::DescriptorSetLayout>),
+    ShaderModule(vk::ShaderModule),
+    DescriptorPool(vk::DescriptorPool, vk::DescriptorSetLayout),
+    CommandPool(vk::CommandPool),
+    QueryPool(vk::QueryPool),
+    Semaphore(vk::Semaphore),
+    ImageViews(Vec<vk::ImageView>),
+    Swapchain(vk::SwapchainKHR),
+}
+
+/// What was dropped, in order of the timeline value after which it may be destroyed.
+#[derive(Default)]
+pub(crate) struct RetireQueue {
+    waiting: Mutex<VecDeque<(u64, Garbage)>>,
+}
+
+impl RetireQueue {
+    /// Destroys everything whose value is at most `completed`.
+    pub(crate) fn collect(&self, device: &Device, completed: u64) {
+        loop {
+            let next = {
+                let Ok(mut waiting) = self.waiting.lock() else { return };
+                match waiting.front() {
+                    Some((value, _)) if *value <= completed => waiting.pop_front(),
+                    _ => None,
+                }
+            };
+            let Some((_, garbage)) = next else { return };
+            destroy(device, garbage);
+        }
+    }
+
+    /// Number of objects that wait.
+    pub(crate) fn len(&self) -> usize {
+        self.waiting.lock().map(|waiting| waiting.len()).unwrap_or(0)
+    }
+}
+
+impl Device {
+    /// Takes an object that no new work will use. Work that is being recorded now may use it still: it is destroyed
+    /// once the next submission has finished.
+    pub(crate) fn retire(&self, garbage: Garbage) {
+        let value = self.submitted.load(Ordering::Acquire) + 1;
+        if let Ok(mut waiting) = self.retired.waiting.lock() {
+            waiting.push_back((value, garbage));
+        }
+    }
+
+    /// Number of dropped objects that wait for the device.
+    pub fn retired_objects(&self) -> usize {
+        self.retired.len()
+    }
+}
+
+fn destroy(device: &Device, garbage: Garbage) {
+    let raw = &device.raw;
+    // SAFETY: each handle was made by this device, was handed over by its only owner, and the timeline has passed the
+    // last submission that could use it.
+    unsafe {
+        match garbage {
+            Garbage::Buffer(buffer, memory, id) => {
+                raw.destroy_buffer(buffer, None);
+                device.free(memory);
+                forget(device, id);
+            }
+            Garbage::Image(image, views, memory, id) => {
+                views.into_iter().for_each(|view| raw.destroy_image_view(view, None));
+                raw.destroy_image(image, None);
+                device.free(memory);
+                forget(device, id);
+            }
+            Garbage::Sampler(sampler) => raw.destroy_sampler(sampler, None),
+            Garbage::AccelStructure(accel) => device.accel_fns.destroy_acceleration_structure(accel, None),
+            Garbage::Pipeline(pipeline, layout, sets) => {
+                raw.destroy_pipeline(pipeline, None);
+                raw.destroy_pipeline_layout(layout, None);
+                sets.into_iter().for_each(|set| raw.destroy_descriptor_set_layout(set, None));
+            }
+            Garbage::ShaderModule(module) => raw.destroy_shader_module(module, None),
+            Garbage::DescriptorPool(pool, layout) => {
+                raw.destroy_descriptor_pool(pool, None);
+                raw.destroy_descriptor_set_layout(layout, None);
+            }
+            Garbage::CommandPool(pool) => raw.destroy_command_pool(pool, None),
+            Garbage::QueryPool(pool) => raw.destroy_query_pool(pool, None),
+            Garbage::Semaphore(semaphore) => raw.destroy_semaphore(semaphore, None),
+            Garbage::ImageViews(views) => {
+                views.into_iter().for_each(|view| raw.destroy_image_view(view, None))
+            }
+            Garbage::Swapchain(swapchain) => {
+                if let Some(fns) = &device.swapchain_fns {
+                    fns.destroy_swapchain(swapchain, None);
+                }
+            }
+        }
+    }
+}
+
+fn forget(device: &Device, id: ResourceId) {
+    if let Ok(mut tracker) = device.tracker.lock() {
+        tracker.forget(id);
+    }
+}

@@ -1,0 +1,56 @@
+//! Errors of the renderer, in words.
+
+use caustica_gpu::GpuError;
+
+/// What can go wrong between a scene and an image.
+#[derive(Debug, thiserror::Error)]
+pub enum RendererError {
+    /// The Vulkan layer refused.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// A shader does not compile; the message holds one line an error, each with file:line.
+    #[error("{file} does not compile:\n{log}")]
+    Compile {
+        /// Main file of the stage, relative to the shader folder.
+        file: String,
+        /// Messages of the compiler.
+        log: String,
+    },
+    /// A shader file is missing or unreadable.
+    #[error("{file}: {reason}")]
+    Source {
+        /// File, relative to the shader folder.
+        file: String,
+        /// Why it could not be read.
+        reason: String,
+    },
+    /// A shader's interface is not what the host offers.
+    #[error("{file}: {reason}")]
+    Interface {
+        /// Main file of the stage.
+        file: String,
+        /// Expected against found.
+        reason: String,
+    },
+    /// The scene asks for more than the device or the tables allow.
+    #[error("{what}: {asked} is more than the {limit} that this device allows")]
+    Limit {
+        /// What.
+        what: String,
+        /// How many were asked for.
+        asked: u64,
+        /// How many are allowed.
+        limit: u64,
+    },
+    /// An id that is not in the tables.
+    #[error("{what} {id} is not in the scene")]
+    Unknown {
+        /// Kind of id.
+        what: &'static str,
+        /// The id.
+        id: String,
+    },
+}
+
+/// Result of this package.
+pub type Result<T> = std::result::Result<T, RendererError>;

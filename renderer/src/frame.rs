@@ -1,0 +1,174 @@
+//! The order of the passes, from top to bottom. Enters: a view and the scene. Leaves: its display image.
+
+use caustica_gpu::{Access, Recorder, Stage, Use};
+use glam::{Mat4, Vec2};
+
+use crate::accel::Accel;
+use crate::delta::Invalidation;
+use crate::error::Result;
+use crate::gpu_types::{self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC};
+use crate::needs::Needs;
+use crate::passes::{PassSet, Scope};
+use crate::settings::ToneMap;
+use crate::tables::Tables;
+use crate::view::{CameraMatrices, View, jitter_px};
+
+/// Records one frame of a view.
+///
+/// # Errors
+/// When memory runs out or a pass and its shader disagree.
+pub(crate) fn record(
+    recorder: &mut Recorder,
+    view: &mut View,
+    tables: &Tables,
+    accel: &Accel,
+    passes: &PassSet,
+    needs: Needs,
+) -> Result<()> {
+    view.prepare_targets(needs)?;
+    let what = view.accumulation.take_pending();
+    let plan = Plan::of(view, what, needs);
+    let matrices = CameraMatrices::of(view.camera(), view.extent());
+    let constants = frame_constants(recorder, view, tables, &matrices, &plan)?;
+    let frame_address = recorder.stage_bytes(bytemuck::bytes_of(&constants))?;
+    let scope = Scope {
+        tables,
+        accel,
+        set: tables.textures.set_of(recorder.slot()),
+        frame_address,
+        extent: view.extent(),
+    };
+    if constants.accumulated == 0 {
+        recorder.clear_buffer(&view.counters.device);
+    }
+    let parity = (view.frame_count % 2) as usize;
+    let (Some((_, targets)), Some(accumulator)) = (&view.targets, &view.accumulator) else {
+        return Ok(());
+    };
+
+    passes.gbuffer.record(recorder, &scope, targets, parity)?;
+    if let Some(shadow) = &passes.shadow {
+        shadow.record(recorder, &scope, targets, parity)?;
+    }
+    if let Some(temporal) = passes.temporal.as_ref().filter(|_| plan.moving) {
+        temporal.record(recorder, &scope, targets, parity)?;
+    }
+    let light = match (&targets.history, plan.moving) {
+        (Some(history), true) => Some((&history.diffuse[parity], &history.specular[parity])),
+        _ => targets.direct_diffuse.as_ref().zip(targets.direct_specular.as_ref()),
+    };
+    passes.shading.record(recorder, &scope, targets, parity, light)?;
+    if !plan.moving {
+        passes.accumulate.record(recorder, &scope, targets, accumulator, &view.counters.device)?;
+    }
+    passes.post.record(recorder, &scope, targets, parity, accumulator, view.settings().show)?;
+    let counters = &view.counters;
+    recorder.copy_buffer(&counters.device, &counters.host[recorder.slot() % counters.host.len()], 16)?;
+
+    if !plan.moving {
+        view.accumulation.advance();
+    }
+    view.previous = Some(matrices);
+    view.frame_count += 1;
+    Ok(())
+}
+
+/// What kind of frame this is.
+struct Plan {
+    /// Shown denoised, not accumulated: something moved.
+    moving: bool,
+    /// The past belongs to the last frame and may be reprojected.
+    history: bool,
+}
+
+impl Plan {
+    fn of(view: &View, what: Invalidation, needs: Needs) -> Self {
+        let moved = matches!(what, Invalidation::Camera | Invalidation::Scene);
+        let moving = moved && needs.temporal && view.settings().temporal && view.previous.is_some();
+        Self { moving, history: moving && what < Invalidation::Everything }
+    }
+}
+
+fn frame_constants(
+    recorder: &mut Recorder,
+    view: &mut View,
+    tables: &Tables,
+    matrices: &CameraMatrices,
+    plan: &Plan,
+) -> Result<gpu_types::Frame> {
+    let extent = view.extent();
+    let sample = view.accumulation.next_sample();
+    let sample_index = if plan.moving { view.accumulation.next_moving_index() } else { sample.index };
+    let jittered =
+        crate::accumulation::Sample { index: sample_index, stream: (sample_index % 2) as u32, ..sample };
+    let selection = selection_address(recorder, view)?;
+    let settings = view.settings();
+    let jitter = if settings.jitter { jitter_px(&jittered, settings.seed) } else { Vec2::ZERO };
+    let previous: Mat4 =
+        view.previous.map_or(matrices.clip_from_render, |previous| previous.clip_from_render);
+    let mut flags = 0;
+    for (set, flag) in [
+        (matrices.orthographic, FRAME_ORTHOGRAPHIC),
+        (plan.moving, FRAME_MOVING),
+        (plan.history, FRAME_HISTORY),
+        (settings.opaque_glass_shadows, FRAME_OPAQUE_GLASS),
+    ] {
+        flags |= if set { flag } else { 0 };
+    }
+    Ok(gpu_types::Frame {
+        clip_from_render: matrices.jittered(jitter, extent).to_cols_array(),
+        clip_from_render_unjittered: matrices.clip_from_render.to_cols_array(),
+        previous_clip_from_render: previous.to_cols_array(),
+        render_from_camera: matrices.render_from_camera,
+        half_extent: matrices.half_extent.to_array(),
+        jitter_px: jitter.to_array(),
+        extent_px: extent,
+        near_m: matrices.near_m,
+        exposure: settings.exposure_ev.clamp(-40.0, 40.0).exp2(),
+        scene: tables.address(),
+        counters: view.counters.device.address(),
+        accumulator: view.accumulator.as_ref().map_or(0, caustica_gpu::Buffer::address),
+        sample_index,
+        selection,
+        seed: settings.seed,
+        flags,
+        light_samples: settings.light_samples.max(1),
+        shadow_rays: settings.shadow_rays.max(1),
+        max_depth: settings.max_depth,
+        tone_map: match settings.tone_map {
+            ToneMap::Linear => gpu_types::TONE_MAP_LINEAR,
+            ToneMap::Aces => gpu_types::TONE_MAP_ACES,
+            ToneMap::Agx => gpu_types::TONE_MAP_AGX,
+            ToneMap::Neutral => gpu_types::TONE_MAP_NEUTRAL,
+        },
+        reflection_roughness_max: settings.reflection_roughness_max,
+        temporal_max_history: settings.temporal_max_history.max(1.0),
+        block_index: sample.block as u32,
+        block_start: u32::from(sample.opens_block),
+        block_end: u32::from(sample.closes_block),
+        accumulated: view.accumulation.samples().min(u64::from(u32::MAX)) as u32,
+        selection_count: view.selection.len() as u32 * 32,
+        pad0: 0,
+    })
+}
+
+/// Stages the bit set of the outlined instances; 0 when nothing is selected.
+fn selection_address(recorder: &mut Recorder, view: &View) -> Result<u64> {
+    if view.selection.is_empty() {
+        return Ok(0);
+    }
+    Ok(recorder.stage_bytes(bytemuck::cast_slice(&view.selection))?)
+}
+
+/// Reads the counters that a finished frame of this slot has left.
+pub(crate) fn read_counters(view: &mut View, slot: usize) {
+    let host = &view.counters.host[slot % view.counters.host.len()];
+    if let Some(word) = host.mapped().first_chunk::<4>() {
+        view.statistics.non_finite = u64::from(u32::from_ne_bytes(*word));
+    }
+}
+
+/// The uses of a host that reads an accumulator.
+pub(crate) fn read_use(buffer: &caustica_gpu::Buffer) -> Use<'_> {
+    Use::Buffer(buffer, Stage::Transfer, Access::TransferRead)
+}

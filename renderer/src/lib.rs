@@ -1,0 +1,26 @@
+//! The renderer of Caustica: a flat scene in, an image out. It knows no hierarchy, no file format and no window.
+//! Start at [`Renderer`]; the order of the passes is in `frame.rs`.
+
+mod accel;
+mod accumulation;
+pub mod delta;
+mod error;
+mod frame;
+pub mod gpu_types;
+mod measure;
+mod needs;
+mod passes;
+mod renderer;
+mod settings;
+pub mod shader;
+mod tables;
+mod view;
+
+pub use accumulation::{Accumulation, BLOCK_SAMPLES, Sample};
+pub use caustica_gpu as gpu;
+pub use error::{RendererError, Result};
+pub use measure::{AccelStatistics, LeftOut, Statistics, TlasWork};
+pub use needs::{Needs, SceneSummary};
+pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
+pub use settings::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+pub use view::{View, ViewId};

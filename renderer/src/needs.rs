@@ -1,0 +1,268 @@
+//! What this scene needs. Enters: counts of what the scene holds, and the view's settings. Leaves: which passes run,
+//! which branches stay in the shaders, and a sentence for everything that was left out. Pure: no device.
+
+use caustica_gpu::Specialization;
+
+use crate::delta::{Material, ShadingMode};
+use crate::measure::LeftOut;
+use crate::settings::{NeedsMode, Pipeline, ViewSettings};
+use crate::tables::{emits, has_alpha, is_opaque, transmits};
+
+/// What a scene holds, as far as it decides what is needed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SceneSummary {
+    /// Punctual lights that shine.
+    pub lights: u32,
+    /// Every punctual light is a point or infinitely small.
+    pub all_lights_hard: bool,
+    /// Triangles that emit.
+    pub emissive_triangles: u32,
+    /// The environment is not black.
+    pub environment: bool,
+    /// The environment is a map.
+    pub environment_map: bool,
+    /// Some material has a texture.
+    pub textures: bool,
+    /// Some material has a normal map.
+    pub normal_maps: bool,
+    /// Some material emits or is unlit.
+    pub emission: bool,
+    /// Some material mirrors.
+    pub mirrors: bool,
+    /// The smallest roughness of a PBR material, in thousandths; textured roughness counts as 0.
+    pub min_roughness_permille: u32,
+    /// Some surface lets light pass.
+    pub transmission: bool,
+    /// Some surface has holes or coverage.
+    pub alpha: bool,
+    /// Some geometry is not opaque to rays.
+    pub any_hit: bool,
+}
+
+impl SceneSummary {
+    /// Adds what a material in use brings.
+    pub(crate) fn add_material(&mut self, material: &Material) {
+        let textures = [
+            &material.base_color_texture,
+            &material.metallic_roughness_texture,
+            &material.normal_texture,
+            &material.occlusion_texture,
+            &material.emissive_texture,
+        ];
+        self.textures |= textures.iter().any(|texture| texture.is_some());
+        self.normal_maps |= material.normal_texture.is_some();
+        self.emission |= emits(material) || material.mode == ShadingMode::Unlit;
+        self.mirrors |= material.mode == ShadingMode::Reflective;
+        self.transmission |= transmits(material);
+        self.alpha |= has_alpha(material);
+        self.any_hit |= !is_opaque(material);
+        if material.mode == ShadingMode::Pbr {
+            let textured = material.metallic_roughness_texture.is_some();
+            let roughness = if textured { 0.0 } else { material.roughness.clamp(0.0, 1.0) };
+            self.min_roughness_permille = self.min_roughness_permille.min((roughness * 1000.0) as u32);
+        }
+    }
+
+    /// A summary to which materials are added.
+    pub(crate) fn without_materials() -> Self {
+        Self { min_roughness_permille: 1001, all_lights_hard: true, ..Self::default() }
+    }
+}
+
+/// What is built and run for one view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Needs {
+    /// Punctual lights.
+    pub lights: bool,
+    /// Emissive triangles as lights.
+    pub emissive_lights: bool,
+    /// Light of the environment.
+    pub environment: bool,
+    /// The environment is a map.
+    pub environment_map: bool,
+    /// Textures.
+    pub textures: bool,
+    /// Normal maps.
+    pub normal_maps: bool,
+    /// Reflection rays.
+    pub reflection: bool,
+    /// Refraction rays.
+    pub refraction: bool,
+    /// The emissive target.
+    pub emission: bool,
+    /// Any-hit shaders.
+    pub any_hit: bool,
+    /// The alpha variant of the raster G-buffer.
+    pub alpha: bool,
+    /// Shadow rays: false in the raster pipeline.
+    pub shadow_rays: bool,
+    /// The temporal pass.
+    pub temporal: bool,
+}
+
+impl Needs {
+    /// Decides for a scene and the settings of a view.
+    pub fn of(scene: &SceneSummary, settings: &ViewSettings) -> Self {
+        let rays = settings.pipeline != Pipeline::Raster;
+        let all = settings.needs == NeedsMode::All;
+        let roughness_max = (settings.reflection_roughness_max * 1000.0) as u32;
+        let secondary = rays && settings.max_depth > 0;
+        let noisy = !scene.all_lights_hard
+            || scene.lights > settings.light_samples
+            || scene.emissive_triangles > 0
+            || scene.environment
+            || scene.alpha;
+        Self {
+            lights: all || scene.lights > 0,
+            emissive_lights: all || scene.emissive_triangles > 0,
+            environment: all || scene.environment,
+            environment_map: all || scene.environment_map,
+            textures: all || scene.textures,
+            normal_maps: all || scene.normal_maps,
+            reflection: secondary && (all || scene.mirrors || scene.min_roughness_permille <= roughness_max),
+            refraction: secondary && (all || scene.transmission),
+            emission: all || scene.emission,
+            any_hit: rays && (all || scene.any_hit),
+            alpha: all || scene.alpha,
+            shadow_rays: rays,
+            temporal: settings.temporal && rays && (all || noisy),
+        }
+    }
+
+    /// Whether any light arrives at surfaces, so that the shadow pass runs.
+    pub fn direct_light(&self) -> bool {
+        self.lights || self.emissive_lights || self.environment
+    }
+
+    /// Whether the shading pass traces rays of its own.
+    pub fn secondary_rays(&self) -> bool {
+        self.reflection || self.refraction
+    }
+
+    /// Constants of `shaders/shared/needs.glsl`, in its order.
+    pub fn specialization(&self) -> Specialization {
+        let values = [
+            self.lights,
+            self.emissive_lights,
+            self.environment,
+            self.environment_map,
+            self.textures,
+            self.normal_maps,
+            self.reflection,
+            self.refraction,
+            self.emission,
+            self.shadow_rays,
+        ];
+        Specialization {
+            values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),
+        }
+    }
+
+    /// What was left out, and why, in words.
+    pub fn left_out(&self, settings: &ViewSettings) -> Vec<LeftOut> {
+        let rays = settings.pipeline != Pipeline::Raster;
+        let no_rays = "the raster pipeline casts no rays";
+        let why_no_secondary = |nothing: &'static str| {
+            if !rays {
+                no_rays
+            } else if settings.max_depth == 0 {
+                "the depth of reflections is set to 0"
+            } else {
+                nothing
+            }
+        };
+        let list: [(bool, &str, &str); 12] = [
+            (
+                self.direct_light(),
+                "shadow pass",
+                "the scene has no light, no emitter and a black environment",
+            ),
+            (self.lights, "punctual lights", "the scene has none"),
+            (self.emissive_lights, "emissive triangles as lights", "no surface emits"),
+            (self.environment, "environment light", "the environment is black"),
+            (self.environment_map || !self.environment, "environment map", "the environment is a constant"),
+            (self.textures, "texture look-ups", "no material has a texture"),
+            (self.normal_maps, "normal mapping", "no material has a normal map"),
+            (self.reflection, "reflection rays", why_no_secondary("no surface is smooth enough to mirror")),
+            (self.refraction, "refraction rays", why_no_secondary("no surface lets light pass")),
+            (self.emission, "emissive target", "no surface emits"),
+            (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),
+            (
+                self.temporal,
+                "temporal denoising",
+                if !rays {
+                    no_rays
+                } else if settings.temporal {
+                    "every light is hard, so one ray gives the exact shadow"
+                } else {
+                    "a still image accumulates its samples"
+                },
+            ),
+        ];
+        list.into_iter()
+            .filter(|(needed, ..)| !needed)
+            .map(|(_, what, why)| LeftOut { what: what.to_owned(), why: why.to_owned() })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary(materials: &[Material]) -> SceneSummary {
+        let mut summary = SceneSummary::without_materials();
+        materials.iter().for_each(|material| summary.add_material(material));
+        summary
+    }
+
+    fn rough() -> Material {
+        Material { metallic: 0.0, roughness: 1.0, ..Material::default() }
+    }
+
+    #[test]
+    fn a_dark_rough_scene_needs_nothing() {
+        let needs = Needs::of(&summary(&[rough()]), &ViewSettings::default());
+        assert!(!needs.direct_light() && !needs.secondary_rays() && !needs.any_hit && !needs.temporal);
+        let left_out: Vec<_> = needs.left_out(&ViewSettings::default()).into_iter().map(|l| l.what).collect();
+        assert!(
+            left_out.contains(&String::from("shadow pass"))
+                && left_out.contains(&String::from("reflection rays"))
+        );
+    }
+
+    #[test]
+    fn hard_lights_need_shadow_rays_but_no_denoising() {
+        let scene = SceneSummary { lights: 2, ..summary(&[rough()]) };
+        let needs = Needs::of(&scene, &ViewSettings::default());
+        assert!(needs.direct_light() && !needs.temporal);
+        let many = SceneSummary { lights: 20, ..scene };
+        assert!(Needs::of(&many, &ViewSettings::default()).temporal, "lights drawn at random are noisy");
+        let soft = SceneSummary { all_lights_hard: false, ..scene };
+        assert!(Needs::of(&soft, &ViewSettings::default()).temporal);
+    }
+
+    #[test]
+    fn each_kind_of_surface_brings_its_rays() {
+        let settings = ViewSettings::default();
+        let mirror = Material { mode: ShadingMode::Reflective, ..rough() };
+        let glass = Material { mode: ShadingMode::Refractive, ..rough() };
+        let smooth = Material { roughness: 0.2, ..rough() };
+        assert!(Needs::of(&summary(&[rough(), mirror]), &settings).reflection);
+        let needs = Needs::of(&summary(&[glass]), &settings);
+        assert!(needs.refraction && needs.any_hit);
+        assert!(Needs::of(&summary(std::slice::from_ref(&smooth)), &settings).reflection);
+        let no_depth = ViewSettings { max_depth: 0, ..settings.clone() };
+        assert!(!Needs::of(&summary(std::slice::from_ref(&smooth)), &no_depth).reflection);
+        let raster = ViewSettings { pipeline: Pipeline::Raster, ..settings };
+        assert!(!Needs::of(&summary(&[smooth]), &raster).secondary_rays());
+    }
+
+    #[test]
+    fn all_means_all() {
+        let settings = ViewSettings { needs: NeedsMode::All, ..ViewSettings::default() };
+        let needs = Needs::of(&summary(&[rough()]), &settings);
+        assert!(needs.left_out(&settings).is_empty());
+        assert!(needs.specialization().values.iter().all(|(_, value)| *value == 1));
+    }
+}

@@ -1,0 +1,176 @@
+//! The passes. Each is one struct with its pipelines, a `record`, and a shader folder of the same name.
+//! This file holds what they share: how pipelines are built, and what a pass may touch.
+
+mod accumulate;
+mod gbuffer;
+mod post;
+mod shading;
+mod shadow;
+mod temporal;
+
+use std::sync::Arc;
+
+use caustica_gpu::{
+    Bind, ComputePipeline, Device, HitGroup, RayTracingDesc, RayTracingPipeline, Recorder, SceneSet,
+    Specialization, Stage, Use,
+};
+
+pub(crate) use accumulate::Accumulate;
+pub(crate) use gbuffer::GBuffer;
+pub(crate) use post::Post;
+pub(crate) use shading::Shading;
+pub(crate) use shadow::Shadow;
+pub(crate) use temporal::Temporal;
+
+use crate::accel::Accel;
+use crate::error::Result;
+use crate::gpu_types::Push;
+use crate::needs::Needs;
+use crate::settings::Pipeline;
+use crate::shader::{ShaderLibrary, merge_interfaces};
+use crate::tables::Tables;
+
+/// Builds pipelines for one set of needs.
+pub(crate) struct Builder<'a> {
+    pub(crate) device: &'a Arc<Device>,
+    pub(crate) library: &'a mut ShaderLibrary,
+    pub(crate) set: &'a SceneSet,
+    pub(crate) needs: Needs,
+    pub(crate) specialization: Specialization,
+}
+
+impl Builder<'_> {
+    fn compute(&mut self, label: &str, file: &str) -> Result<ComputePipeline> {
+        let stage = self.library.stage(file)?;
+        let set = Some(self.set);
+        Ok(ComputePipeline::new(
+            self.device,
+            label,
+            &stage.module,
+            &stage.interface,
+            &self.specialization,
+            set,
+        )?)
+    }
+
+    /// A ray-tracing pipeline around one ray generation shader; the other stages are the same for all.
+    fn rays(&mut self, label: &str, file: &str) -> Result<RayTracingPipeline> {
+        let generation = self.library.stage(file)?;
+        let surface_hit = self.library.stage("passes/rays/surface.rchit")?;
+        let surface_miss = self.library.stage("passes/rays/surface.rmiss")?;
+        let shadow_miss = self.library.stage("passes/rays/shadow.rmiss")?;
+        let any_hits = if self.needs.any_hit {
+            Some((
+                self.library.stage("passes/rays/surface.rahit")?,
+                self.library.stage("passes/rays/shadow.rahit")?,
+            ))
+        } else {
+            None
+        };
+        let mut stages = vec![&*generation, &*surface_hit, &*surface_miss, &*shadow_miss];
+        if let Some((surface, shadow)) = &any_hits {
+            stages.extend([&**surface, &**shadow]);
+        }
+        let interface = merge_interfaces(&stages)?;
+        let (surface_any, shadow_any) = match &any_hits {
+            Some((surface, shadow)) => (Some(&surface.module), Some(&shadow.module)),
+            None => (None, None),
+        };
+        let desc = RayTracingDesc {
+            name: label,
+            ray_generation: &generation.module,
+            misses: &[&surface_miss.module, &shadow_miss.module],
+            hit_groups: &[
+                HitGroup { closest_hit: Some(&surface_hit.module), any_hit: surface_any, intersection: None },
+                HitGroup { closest_hit: None, any_hit: shadow_any, intersection: None },
+            ],
+        };
+        Ok(RayTracingPipeline::new(self.device, &desc, &interface, &self.specialization, Some(self.set))?)
+    }
+}
+
+/// What the passes of one frame may touch.
+pub(crate) struct Scope<'a> {
+    pub(crate) tables: &'a Tables,
+    pub(crate) accel: &'a Accel,
+    pub(crate) set: &'a SceneSet,
+    pub(crate) frame_address: u64,
+    pub(crate) extent: [u32; 2],
+}
+
+impl Scope<'_> {
+    fn push(&self, argument0: u32) -> Push {
+        Push { frame_address: self.frame_address, argument0, argument1: 0 }
+    }
+
+    /// Runs a compute pass over every pixel.
+    fn compute(
+        &self,
+        recorder: &mut Recorder,
+        label: &str,
+        pipeline: &ComputePipeline,
+        binds: &[(&str, Bind<'_>)],
+        uses: &[Use<'_>],
+        argument0: u32,
+    ) -> Result<()> {
+        let mut all = uses.to_vec();
+        if pipeline.interface().uses_scene {
+            all.extend(self.tables.uses(Stage::Compute));
+        }
+        let groups = [self.extent[0].div_ceil(8), self.extent[1].div_ceil(8), 1];
+        let push = self.push(argument0);
+        recorder.pass(label, |recorder| {
+            recorder.dispatch(pipeline, Some(self.set), binds, &all, bytemuck::bytes_of(&push), groups)
+        })?;
+        Ok(())
+    }
+
+    /// Launches one ray generation shader a pixel.
+    fn rays(
+        &self,
+        recorder: &mut Recorder,
+        label: &str,
+        pipeline: &RayTracingPipeline,
+        binds: &[(&str, Bind<'_>)],
+        argument0: u32,
+    ) -> Result<()> {
+        let mut uses = self.tables.uses(Stage::RayTracing).to_vec();
+        uses.extend(self.accel.uses());
+        let push = self.push(argument0);
+        recorder.pass(label, |recorder| {
+            recorder.trace_rays(
+                pipeline,
+                Some(self.set),
+                binds,
+                &uses,
+                bytemuck::bytes_of(&push),
+                self.extent,
+            )
+        })?;
+        Ok(())
+    }
+}
+
+/// The passes of one pipeline for one set of needs.
+pub(crate) struct PassSet {
+    pub(crate) gbuffer: GBuffer,
+    pub(crate) shadow: Option<Shadow>,
+    pub(crate) temporal: Option<Temporal>,
+    pub(crate) shading: Shading,
+    pub(crate) accumulate: Accumulate,
+    pub(crate) post: Post,
+}
+
+impl PassSet {
+    pub(crate) fn new(builder: &mut Builder<'_>, pipeline: Pipeline) -> Result<Self> {
+        let needs = builder.needs;
+        Ok(Self {
+            gbuffer: GBuffer::new(builder, pipeline)?,
+            shadow: needs.direct_light().then(|| Shadow::new(builder)).transpose()?,
+            temporal: (needs.temporal && needs.direct_light()).then(|| Temporal::new(builder)).transpose()?,
+            shading: Shading::new(builder)?,
+            accumulate: Accumulate::new(builder)?,
+            post: Post::new(builder)?,
+        })
+    }
+}

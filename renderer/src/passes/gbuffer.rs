@@ -1,0 +1,134 @@
+//! Pass `gbuffer`: what is seen through every pixel. Enters: instances, materials. Leaves: ids, normals, material,
+//! motion, depth. By raster, or by rays with the same result.
+
+use caustica_gpu::{
+    Bind, ColorTarget, Draw, Format, GraphicsDesc, GraphicsPipeline, Image, RayTracingPipeline, Recorder,
+    Stage,
+};
+
+use super::{Builder, Scope};
+use crate::error::Result;
+use crate::gpu_types::Push;
+use crate::settings::Pipeline;
+use crate::shader::merge_interfaces;
+use crate::tables::Batch;
+use crate::view::Targets;
+
+/// The pass.
+pub(crate) enum GBuffer {
+    Raster { opaque: GraphicsPipeline, alpha: Option<GraphicsPipeline> },
+    Rays { trace: RayTracingPipeline },
+}
+
+impl GBuffer {
+    pub(crate) fn new(builder: &mut Builder<'_>, pipeline: Pipeline) -> Result<Self> {
+        if pipeline == Pipeline::Raytraced {
+            return Ok(Self::Rays { trace: builder.rays("gbuffer.trace", "passes/gbuffer/gbuffer.rgen")? });
+        }
+        let emission = if builder.needs.emission { "_emissive" } else { "" };
+        let opaque = raster(builder, "gbuffer.raster", &format!("passes/gbuffer/gbuffer{emission}.frag"))?;
+        let alpha = if builder.needs.alpha {
+            let file = format!("passes/gbuffer/gbuffer_alpha{emission}.frag");
+            Some(raster(builder, "gbuffer.raster alpha", &file)?)
+        } else {
+            None
+        };
+        Ok(Self::Raster { opaque, alpha })
+    }
+
+    /// Fills the G-buffer; `parity` chooses among the two normal and depth images.
+    pub(crate) fn record(
+        &self,
+        recorder: &mut Recorder,
+        scope: &Scope<'_>,
+        targets: &Targets,
+        parity: usize,
+    ) -> Result<()> {
+        let normal = &targets.normal[parity % targets.normal.len()];
+        let depth = &targets.depth[parity % targets.depth.len()];
+        match self {
+            Self::Rays { trace } => {
+                let binds = [
+                    ("gbuffer_id", Bind::Image(&targets.id)),
+                    ("gbuffer_normal", Bind::Image(normal)),
+                    ("gbuffer_base_color", Bind::Image(&targets.base_color)),
+                    ("gbuffer_material", Bind::Image(&targets.material)),
+                    ("gbuffer_motion", Bind::Image(&targets.motion)),
+                    ("gbuffer_depth", Bind::Image(depth)),
+                    // Never written without emission, but something of the kind has to be bound.
+                    ("gbuffer_emissive", Bind::Image(targets.emissive.as_ref().unwrap_or(&targets.shaded))),
+                ];
+                scope.rays(recorder, "gbuffer.trace", trace, &binds, 1)
+            }
+            Self::Raster { opaque, alpha } => {
+                let mut colors: Vec<&Image> =
+                    vec![&targets.id, normal, &targets.base_color, &targets.material, &targets.motion];
+                colors.extend(targets.emissive.as_ref());
+                draw(recorder, scope, opaque, alpha.as_ref(), &colors, depth)
+            }
+        }
+    }
+}
+
+fn raster(builder: &mut Builder<'_>, label: &str, fragment_file: &str) -> Result<GraphicsPipeline> {
+    let vertex = builder.library.stage("passes/gbuffer/gbuffer.vert")?;
+    let fragment = builder.library.stage(fragment_file)?;
+    let interface = merge_interfaces(&[&vertex, &fragment])?;
+    let mut colors: Vec<ColorTarget> =
+        [Format::Rgba32Uint, Format::Rg32Uint, Format::Rgba16Float, Format::Rg16Float, Format::Rg32Float]
+            .map(|format| ColorTarget { format })
+            .to_vec();
+    if builder.needs.emission {
+        colors.push(ColorTarget { format: Format::Rgba32Float });
+    }
+    let desc = GraphicsDesc {
+        name: label,
+        vertex: &vertex.module,
+        fragment: &fragment.module,
+        colors: &colors,
+        depth: Some(Format::Depth32),
+    };
+    Ok(GraphicsPipeline::new(builder.device, &desc, &interface, &builder.specialization, Some(builder.set))?)
+}
+
+fn draw(
+    recorder: &mut Recorder,
+    scope: &Scope<'_>,
+    opaque: &GraphicsPipeline,
+    alpha: Option<&GraphicsPipeline>,
+    colors: &[&Image],
+    depth: &Image,
+) -> Result<()> {
+    let batches = scope.tables.draws.batches();
+    let pushes: Vec<Push> = batches.iter().map(|batch| scope.push(batch.key.geometry)).collect();
+    let mut solid = Vec::new();
+    let mut holes = Vec::new();
+    for (batch, push) in batches.iter().zip(&pushes) {
+        let list = if batch.key.alpha { &mut holes } else { &mut solid };
+        list.push(draw_of(scope, batch, push)?);
+    }
+    let mut pipelines: Vec<(&GraphicsPipeline, &[Draw<'_>])> = vec![(opaque, &solid)];
+    if let Some(alpha) = alpha {
+        pipelines.push((alpha, &holes));
+    }
+    let uses = scope.tables.uses(Stage::Raster);
+    recorder.pass("gbuffer.raster", |recorder| {
+        recorder.draw(&pipelines, Some(scope.set), &[], &uses, colors, Some(depth), scope.extent)
+    })?;
+    Ok(())
+}
+
+fn draw_of<'a>(scope: &Scope<'a>, batch: &Batch, push: &'a Push) -> Result<Draw<'a>> {
+    let mesh = scope.tables.meshes.get(batch.key.mesh)?;
+    let geometry = &mesh.host.geometries[batch.key.geometry as usize];
+    Ok(Draw {
+        indices: &mesh.indices,
+        first_index: geometry.first_index,
+        index_count: geometry.index_count,
+        first_instance: batch.first_instance,
+        instance_count: batch.instance_count,
+        cull: batch.key.cull,
+        clockwise: batch.key.mirrored,
+        push: bytemuck::bytes_of(push),
+    })
+}

@@ -1,0 +1,400 @@
+//! The renderer: apply a delta, render a view, read it back. Owns the scene on the device and the views.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse, Recorder};
+use glam::Vec3;
+
+use crate::accel::Accel;
+use crate::delta::{InstanceId, Invalidation, MaterialId, SceneDelta};
+use crate::error::{RendererError, Result};
+use crate::frame;
+use crate::gpu_types::AccumulatorPixel;
+use crate::measure::Statistics;
+use crate::needs::{Needs, SceneSummary};
+use crate::passes::{Builder, PassSet};
+use crate::settings::{Pipeline, ViewSettings};
+use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
+use crate::tables::{Changed, Tables};
+use crate::view::{CameraMatrices, View, ViewId};
+
+/// How to make a renderer.
+#[derive(Clone, Debug, Default)]
+pub struct RendererOptions {
+    /// Read shaders from this folder instead of the copy in the binary.
+    pub shaders: Option<PathBuf>,
+}
+
+/// What is seen through a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PickHit {
+    /// Which instance.
+    pub instance: InstanceId,
+    /// Which geometry of its mesh.
+    pub geometry: u32,
+    /// Distance from the camera along its axis, metres; `None` in an orthographic or ray-traced view.
+    pub distance_m: Option<f32>,
+}
+
+/// The accumulated image of a view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Accumulated {
+    /// Columns and rows.
+    pub extent: [u32; 2],
+    /// Mean radiance a pixel, linear RGB, first row at the top.
+    pub mean: Vec<[f32; 3]>,
+    /// Half the difference of the means of streams A and B: an estimate of the error of the mean.
+    pub half_difference: Vec<[f32; 3]>,
+}
+
+/// Scene, views and pipelines on one device.
+pub struct Renderer {
+    device: Arc<Device>,
+    library: ShaderLibrary,
+    tables: Tables,
+    accel: Accel,
+    views: BTreeMap<ViewId, View>,
+    next_view: u32,
+    passes: HashMap<(Pipeline, Needs), PassSet>,
+    summary: SceneSummary,
+    changed: Changed,
+    picked: Buffer,
+}
+
+impl Renderer {
+    /// Makes a renderer with an empty scene. Records and waits for a few uploads.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn new(device: &Arc<Device>, frames: &mut Frames, options: &RendererOptions) -> Result<Self> {
+        let mut recorder = frames.begin()?;
+        let tables = Tables::new(device, &mut recorder)?;
+        frames.submit(recorder, None)?;
+        let sources = ShaderSources::new(options.shaders.clone());
+        let kind = MemoryUse::Staging;
+        Ok(Self {
+            device: Arc::clone(device),
+            library: ShaderLibrary::new(device, sources, SpirvCache::of_user()),
+            tables,
+            accel: Accel::new(device),
+            views: BTreeMap::new(),
+            next_view: 0,
+            passes: HashMap::new(),
+            summary: SceneSummary::without_materials(),
+            changed: Changed { structure: true, ..Changed::default() },
+            picked: Buffer::new(device, "pick", 32, BufferUse::General, Location::ReadBack, kind)?,
+        })
+    }
+
+    /// Takes a change of the scene in, and brings tables and acceleration structures up to date. To be called once a
+    /// frame, before the views are rendered, with an empty delta too: what moved in the last frame comes to rest.
+    ///
+    /// # Errors
+    /// When the delta names what is not there, or memory runs out.
+    pub fn apply(&mut self, recorder: &mut Recorder, delta: &SceneDelta) -> Result<()> {
+        self.tables.settle_transforms();
+        if !delta.is_empty() {
+            let changed = self.tables.apply(recorder, delta)?;
+            self.changed.structure |= changed.structure;
+            self.changed.moved.extend(changed.moved);
+            self.changed.meshes.extend(changed.meshes);
+            self.summary = summarize(&self.tables);
+            let what =
+                if delta.render_origin_changed { Invalidation::Everything } else { Invalidation::Scene };
+            let reason = if delta.reason.is_empty() { "scene" } else { &delta.reason };
+            for view in self.views.values_mut() {
+                view.accumulation.invalidate(what, reason);
+            }
+        }
+        self.tables.flush(recorder)?;
+        let slot = recorder.slot();
+        self.accel.update(recorder, &self.tables, &std::mem::take(&mut self.changed))?;
+        self.tables.textures.update_set(slot);
+        let Tables { environment, textures, .. } = &mut self.tables;
+        environment.update_set(slot, textures.set_of(slot));
+        self.accel.update_set(slot, self.tables.textures.set_of(slot));
+        Ok(())
+    }
+
+    /// Makes a view. `window`: its image is encoded for a window and carries the outline of the selection.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub fn create_view(&mut self, extent: [u32; 2], settings: ViewSettings, window: bool) -> Result<ViewId> {
+        let id = ViewId(self.next_view);
+        self.next_view += 1;
+        self.views.insert(id, View::new(&self.device, extent, settings, window)?);
+        Ok(id)
+    }
+
+    /// Drops a view.
+    pub fn remove_view(&mut self, id: ViewId) {
+        self.views.remove(&id);
+    }
+
+    /// A view.
+    ///
+    /// # Errors
+    /// When it was removed.
+    pub fn view(&self, id: ViewId) -> Result<&View> {
+        self.views.get(&id).ok_or_else(|| RendererError::Unknown { what: "view", id: id.0.to_string() })
+    }
+
+    /// A view, to be changed.
+    ///
+    /// # Errors
+    /// When it was removed.
+    pub fn view_mut(&mut self, id: ViewId) -> Result<&mut View> {
+        self.views.get_mut(&id).ok_or_else(|| RendererError::Unknown { what: "view", id: id.0.to_string() })
+    }
+
+    /// Outlines these instances in a view. Keeps the samples.
+    ///
+    /// # Errors
+    /// When the view was removed.
+    pub fn select(&mut self, id: ViewId, instances: impl Iterator<Item = InstanceId>) -> Result<()> {
+        let slots: Vec<u32> =
+            instances.filter_map(|instance| self.tables.instances.slot_of(instance)).collect();
+        let mut bits = vec![0_u32; slots.iter().max().map_or(0, |last| *last as usize / 32 + 1)];
+        for slot in slots {
+            bits[slot as usize / 32] |= 1 << (slot % 32);
+        }
+        self.view_mut(id)?.selection = bits;
+        Ok(())
+    }
+
+    /// Records one frame of a view.
+    ///
+    /// # Errors
+    /// When a shader does not compile or fit, or memory runs out.
+    pub fn render(&mut self, recorder: &mut Recorder, id: ViewId) -> Result<()> {
+        let view = self.view(id)?;
+        let settings = view.settings().clone();
+        let needs = Needs::of(&self.summary, &settings);
+        self.prepare_passes(settings.pipeline, needs, recorder.slot())?;
+        let (Some(view), Some(passes)) =
+            (self.views.get_mut(&id), self.passes.get(&(settings.pipeline, needs)))
+        else {
+            return Ok(());
+        };
+        frame::read_counters(view, recorder.slot());
+        frame::record(recorder, view, &self.tables, &self.accel, passes, needs)?;
+        view.statistics.left_out = needs.left_out(&settings);
+        view.statistics.samples = view.accumulation.samples();
+        view.accumulation.reason().clone_into(&mut view.statistics.reset_reason);
+        view.statistics.resets = view.accumulation.resets();
+        view.statistics.uploaded_bytes = recorder.uploaded_bytes();
+        view.statistics.acceleration = self.accel.statistics().clone();
+        view.statistics.memory =
+            self.device.memory_by_use().into_iter().map(|(kind, n)| (kind.name().to_owned(), n)).collect();
+        Ok(())
+    }
+
+    /// Takes over the times of the newest frame that has finished.
+    ///
+    /// # Errors
+    /// When the view was removed.
+    pub fn note_times(&mut self, id: ViewId, frames: &Frames) -> Result<()> {
+        let passes = &frames.finished().passes;
+        self.view_mut(id)?.statistics.passes = passes.iter().map(|p| (p.label.clone(), p.ms)).collect();
+        Ok(())
+    }
+
+    /// Figures of a view's last frame, with the counters of all frames when `frames` has finished.
+    ///
+    /// # Errors
+    /// When the view was removed.
+    pub fn statistics(&self, id: ViewId) -> Result<&Statistics> {
+        Ok(self.view(id)?.statistics())
+    }
+
+    fn prepare_passes(&mut self, pipeline: Pipeline, needs: Needs, frame_slot: usize) -> Result<()> {
+        if self.passes.contains_key(&(pipeline, needs)) {
+            return Ok(());
+        }
+        let mut builder = Builder {
+            device: &self.device,
+            library: &mut self.library,
+            set: self.tables.textures.set_of(frame_slot),
+            needs,
+            specialization: needs.specialization(),
+        };
+        let passes = PassSet::new(&mut builder, pipeline)?;
+        self.passes.insert((pipeline, needs), passes);
+        Ok(())
+    }
+
+    /// Reads the accumulated image of a view. Waits for the device.
+    ///
+    /// # Errors
+    /// When the view was removed or has no frame yet, or the device fails.
+    pub fn read_back(&mut self, frames: &mut Frames, id: ViewId) -> Result<Accumulated> {
+        let nothing = || RendererError::Unknown { what: "frame of view", id: id.0.to_string() };
+        let accumulator = self.view(id)?.accumulator.as_ref().ok_or_else(nothing)?;
+        let kind = MemoryUse::Staging;
+        let size = accumulator.size();
+        let host =
+            Buffer::new(&self.device, "read-back", size, BufferUse::General, Location::ReadBack, kind)?;
+        let mut recorder = frames.begin()?;
+        let slot = recorder.slot();
+        recorder.declare(&[frame::read_use(accumulator)]);
+        recorder.copy_buffer(accumulator, &host, size)?;
+        let counters = &self.view(id)?.counters;
+        recorder.copy_buffer(&counters.device, &counters.host[slot % counters.host.len()], 16)?;
+        frames.submit(recorder, None)?;
+        frames.finish()?;
+        let view = self.view_mut(id)?;
+        frame::read_counters(view, slot);
+        Ok(mean_of(bytemuck::cast_slice(host.mapped()), view.extent()))
+    }
+
+    /// Reads the tone-mapped image of a view: linear RGBA half floats as floats. Waits for the device.
+    ///
+    /// # Errors
+    /// When the view was removed or has no frame yet, or the device fails.
+    pub fn read_display(&mut self, frames: &mut Frames, id: ViewId) -> Result<Vec<[f32; 4]>> {
+        let nothing = || RendererError::Unknown { what: "frame of view", id: id.0.to_string() };
+        let image = self.view(id)?.display_image().ok_or_else(nothing)?;
+        let halves: Vec<u16> = words_of(&read_image(&self.device, frames, image)?);
+        Ok(halves.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|i| half_to_float(p[i]))).collect())
+    }
+
+    /// What is seen through a pixel in the last frame. Waits for the device.
+    ///
+    /// # Errors
+    /// When the view was removed, or the device fails.
+    pub fn pick(&mut self, frames: &mut Frames, id: ViewId, pixel: [u32; 2]) -> Result<Option<PickHit>> {
+        let view = self.view(id)?;
+        let Some((_, targets)) = view.targets.as_ref().filter(|_| view.frame_count > 0) else {
+            return Ok(None);
+        };
+        if (0..2).any(|i| pixel[i] >= view.extent()[i]) {
+            return Ok(None);
+        }
+        let parity = ((view.frame_count - 1) % 2) as usize;
+        let depth = &targets.depth[parity % targets.depth.len()];
+        let mut recorder = frames.begin()?;
+        recorder.copy_to_buffer(&targets.id, pixel, [1, 1], &self.picked)?;
+        frames.submit(recorder, None)?;
+        frames.finish()?;
+        let words: Vec<u32> = words_of(&self.picked.mapped()[..16]);
+        let mut recorder = frames.begin()?;
+        recorder.copy_to_buffer(depth, pixel, [1, 1], &self.picked)?;
+        frames.submit(recorder, None)?;
+        frames.finish()?;
+        let depth = f32::from_bits(bytemuck::pod_read_unaligned(&self.picked.mapped()[..4]));
+        let Some(slot) = words[0].checked_sub(1).and_then(|slot| self.tables.instances.get(slot)) else {
+            return Ok(None);
+        };
+        let matrices = CameraMatrices::of(view.camera(), view.extent());
+        let perspective_raster = !matrices.orthographic && view.settings().pipeline != Pipeline::Raytraced;
+        Ok(Some(PickHit {
+            instance: slot.id,
+            geometry: words[1] & 0x7fff_ffff,
+            distance_m: (perspective_raster && depth > 0.0).then(|| matrices.near_m / depth),
+        }))
+    }
+
+    /// Direction and origin, render space, of the ray through the centre of a pixel.
+    ///
+    /// # Errors
+    /// When the view was removed.
+    pub fn camera_ray(&self, id: ViewId, pixel: [f32; 2]) -> Result<(Vec3, Vec3)> {
+        let view = self.view(id)?;
+        let matrices = CameraMatrices::of(view.camera(), view.extent());
+        let [width, height] = view.extent().map(|n| n as f32);
+        let at = matrices.half_extent
+            * glam::Vec2::new(2.0 * pixel[0] / width - 1.0, 1.0 - 2.0 * pixel[1] / height);
+        let camera = view.camera().render_from_camera;
+        Ok(if matrices.orthographic {
+            (camera.transform_point3(at.extend(0.0)), camera.transform_vector3(Vec3::NEG_Z))
+        } else {
+            (camera.translation.into(), camera.transform_vector3(at.extend(-1.0)).normalize())
+        })
+    }
+}
+
+/// Counts what the scene holds.
+fn summarize(tables: &Tables) -> SceneSummary {
+    let mut summary = SceneSummary {
+        lights: tables.lights.len(),
+        all_lights_hard: tables.lights.all_hard(),
+        emissive_triangles: tables.emissive.len(),
+        environment: tables.environment.shines(),
+        environment_map: tables.environment.is_map() && tables.environment.shines(),
+        ..SceneSummary::without_materials()
+    };
+    let mut used: Vec<MaterialId> = tables.instances.materials_in_use().collect();
+    used.sort_unstable();
+    used.dedup();
+    for id in used {
+        if let Some(material) = tables.materials.get(id) {
+            summary.add_material(material);
+        }
+    }
+    summary
+}
+
+fn read_image(device: &Arc<Device>, frames: &mut Frames, image: &Image) -> Result<Vec<u8>> {
+    let [width, height] = image.extent();
+    let size = u64::from(width) * u64::from(height) * image.desc().format.texel_bytes();
+    let kind = MemoryUse::Staging;
+    let host = Buffer::new(device, "read-back", size, BufferUse::General, Location::ReadBack, kind)?;
+    let mut recorder = frames.begin()?;
+    recorder.copy_to_buffer(image, [0, 0], [width, height], &host)?;
+    frames.submit(recorder, None)?;
+    frames.finish()?;
+    Ok(host.mapped().to_vec())
+}
+
+/// Copies bytes into a vector of plain values, whatever their alignment.
+fn words_of<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
+    bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
+}
+
+/// Mean and half difference of the two streams, in double precision.
+fn mean_of(pixels: &[AccumulatorPixel], extent: [u32; 2]) -> Accumulated {
+    let count = extent[0] as usize * extent[1] as usize;
+    let (mut mean, mut half_difference) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for pixel in pixels.iter().take(count) {
+        let sums = [0, 1].map(|s| {
+            let stream = &pixel.stream[s];
+            [0, 1, 2, 3]
+                .map(|c| f64::from(stream.high[c]) + f64::from(stream.low[c]) + f64::from(stream.block[c]))
+        });
+        let n = sums[0][3] + sums[1][3];
+        let channel = |c: usize| if n > 0.0 { (sums[0][c] + sums[1][c]) / n } else { 0.0 };
+        let of_stream =
+            |s: usize, c: usize| if sums[s][3] > 0.0 { sums[s][c] / sums[s][3] } else { channel(c) };
+        mean.push([0, 1, 2].map(|c| channel(c) as f32));
+        half_difference.push([0, 1, 2].map(|c| (0.5 * (of_stream(0, c) - of_stream(1, c))) as f32));
+    }
+    Accumulated { extent, mean, half_difference }
+}
+
+/// IEEE 754 binary16 to binary32.
+fn half_to_float(half: u16) -> f32 {
+    let sign = if half & 0x8000 == 0 { 1.0 } else { -1.0 };
+    let (exponent, fraction) = (i32::from((half >> 10) & 0x1f), f32::from(half & 0x3ff));
+    sign * match exponent {
+        0 => fraction * 2f32.powi(-24),
+        31 if fraction == 0.0 => f32::INFINITY,
+        31 => f32::NAN,
+        _ => (1.0 + fraction / 1024.0) * 2f32.powi(exponent - 15),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_become_floats() {
+        for (half, value) in [(0x3c00, 1.0), (0xc000, -2.0), (0x0001, 5.960_464_5e-8), (0x7bff, 65504.0)] {
+            assert_eq!(half_to_float(half), value);
+        }
+        assert!(half_to_float(0x7e00).is_nan());
+    }
+}

@@ -1,0 +1,184 @@
+//! What a caller may choose for a view. Plain values; the editor's panel and the command line fill the same struct.
+
+use serde::{Deserialize, Serialize};
+
+/// How an image is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Pipeline {
+    /// G-buffer and deferred shading, no rays.
+    Raster,
+    /// Rasterised G-buffer, ray-traced shadows, reflections and refractions.
+    #[default]
+    Hybrid,
+    /// The same with ray-traced primary visibility.
+    Raytraced,
+}
+
+impl Pipeline {
+    /// Every pipeline, in the order of menus.
+    pub const ALL: [Self; 3] = [Self::Raster, Self::Hybrid, Self::Raytraced];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raster => "raster",
+            Self::Hybrid => "hybrid",
+            Self::Raytraced => "raytraced",
+        }
+    }
+}
+
+/// How radiance becomes a displayable colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ToneMap {
+    /// Cut at 1.
+    Linear,
+    /// A fit of the ACES filmic curve.
+    Aces,
+    /// A fit of AgX.
+    Agx,
+    /// Khronos PBR Neutral: base colours come out as they are.
+    #[default]
+    Neutral,
+}
+
+impl ToneMap {
+    /// Every curve, in the order of menus.
+    pub const ALL: [Self; 4] = [Self::Linear, Self::Aces, Self::Agx, Self::Neutral];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Aces => "aces",
+            Self::Agx => "agx",
+            Self::Neutral => "neutral",
+        }
+    }
+}
+
+/// What a view shows: the image, or one of the intermediate targets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Show {
+    /// The finished image.
+    #[default]
+    Image,
+    /// Base colour.
+    BaseColor,
+    /// Shading normal in render space.
+    Normal,
+    /// Geometric normal in render space.
+    GeometricNormal,
+    /// Depth.
+    Depth,
+    /// Metalness.
+    Metallic,
+    /// Roughness.
+    Roughness,
+    /// Motion vectors.
+    Motion,
+    /// Emitted radiance.
+    Emissive,
+    /// A colour an instance.
+    Instance,
+    /// A colour a material.
+    Material,
+    /// A colour a triangle.
+    Triangle,
+    /// Direct diffuse light, demodulated.
+    DirectDiffuse,
+    /// Direct specular light, demodulated.
+    DirectSpecular,
+    /// Length of the temporal history.
+    History,
+}
+
+impl Show {
+    /// Everything that can be shown, in the order of menus, with its name.
+    pub const ALL: [(Self, &'static str); 15] = [
+        (Self::Image, "Image"),
+        (Self::BaseColor, "Base colour"),
+        (Self::Normal, "Shading normal"),
+        (Self::GeometricNormal, "Geometric normal"),
+        (Self::Depth, "Depth"),
+        (Self::Metallic, "Metallic"),
+        (Self::Roughness, "Roughness"),
+        (Self::Motion, "Motion"),
+        (Self::Emissive, "Emission"),
+        (Self::Instance, "Instances"),
+        (Self::Material, "Materials"),
+        (Self::Triangle, "Triangles"),
+        (Self::DirectDiffuse, "Direct diffuse light"),
+        (Self::DirectSpecular, "Direct specular light"),
+        (Self::History, "History length"),
+    ];
+}
+
+/// Whether pipelines are made for this scene or for any.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum NeedsMode {
+    /// Leave out what the scene does not need.
+    #[default]
+    Auto,
+    /// Build and run everything.
+    All,
+}
+
+/// Settings of a view.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ViewSettings {
+    /// Pipeline.
+    pub pipeline: Pipeline,
+    /// What is shown.
+    pub show: Show,
+    /// Special or general variants.
+    pub needs: NeedsMode,
+    /// Exposure in stops; 0 leaves radiance 1 at 1.
+    pub exposure_ev: f32,
+    /// Tone map.
+    pub tone_map: ToneMap,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Lights a pixel in the shadow pass; all of them when there are at most this many.
+    pub light_samples: u32,
+    /// Shadow rays a light and pixel.
+    pub shadow_rays: u32,
+    /// Reflections and refractions after the first surface.
+    pub max_depth: u32,
+    /// Surfaces up to this roughness trace their specular lobe; rougher ones see the environment only.
+    pub reflection_roughness_max: f32,
+    /// Shadow rays stop at glass instead of passing it tinted and unbent.
+    pub opaque_glass_shadows: bool,
+    /// Denoise over time while things move. Off for headless stills, which accumulate anyway.
+    pub temporal: bool,
+    /// Longest history while moving, frames.
+    pub temporal_max_history: f32,
+    /// Jitter primary samples inside the pixel; off gives hard, reproducible edges for tests.
+    pub jitter: bool,
+}
+
+impl Default for ViewSettings {
+    fn default() -> Self {
+        Self {
+            pipeline: Pipeline::Hybrid,
+            show: Show::Image,
+            needs: NeedsMode::Auto,
+            exposure_ev: 0.0,
+            tone_map: ToneMap::Neutral,
+            seed: 0,
+            light_samples: 4,
+            shadow_rays: 1,
+            max_depth: 12,
+            reflection_roughness_max: 0.5,
+            opaque_glass_shadows: false,
+            temporal: true,
+            temporal_max_history: 24.0,
+            jitter: true,
+        }
+    }
+}

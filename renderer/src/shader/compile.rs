@@ -1,0 +1,205 @@
+//! GLSL to SPIR-V with glslang, behind a cache on disk keyed by the text of every file involved.
+//! Enters: a `Source`. Leaves: SPIR-V words, or an error with file and line.
+
+use std::collections::BTreeMap;
+use std::hash::{Hash, Hasher};
+use std::path::PathBuf;
+
+use glslang::error::GlslangError;
+use glslang::include::{IncludeHandler, IncludeResult, IncludeType};
+use glslang::{
+    Compiler, CompilerOptions, GlslProfile, ShaderInput, ShaderMessage, ShaderSource, ShaderStage,
+    SourceLanguage, SpirvVersion, Target, VulkanVersion,
+};
+
+use super::sources::Source;
+use crate::error::{RendererError, Result};
+
+/// First word of every SPIR-V module.
+const SPIRV_MAGIC: u32 = 0x0723_0203;
+/// Bump when the compiler or its options change.
+const CACHE_VERSION: u32 = 1;
+
+/// Compiled shaders on disk. Losing it costs time only.
+#[derive(Clone, Debug, Default)]
+pub struct SpirvCache {
+    folder: Option<PathBuf>,
+}
+
+impl SpirvCache {
+    /// The user's cache folder, `$XDG_CACHE_HOME/caustica/spirv` or `~/.cache/caustica/spirv`; none without a home.
+    pub fn of_user() -> Self {
+        let base = std::env::var_os("XDG_CACHE_HOME")
+            .map(PathBuf::from)
+            .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")));
+        Self { folder: base.map(|base| base.join("caustica").join("spirv")) }
+    }
+
+    /// A cache in `folder`.
+    pub fn at(folder: PathBuf) -> Self {
+        Self { folder: Some(folder) }
+    }
+
+    fn path(&self, key: u64) -> Option<PathBuf> {
+        self.folder.as_ref().map(|folder| folder.join(format!("{key:016x}.spv")))
+    }
+
+    fn load(&self, key: u64) -> Option<Vec<u32>> {
+        let bytes = std::fs::read(self.path(key)?).ok()?;
+        let words: Vec<u32> = bytes
+            .chunks_exact(4)
+            .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+            .collect();
+        let (checksum, words) = words.split_last()?;
+        (words.first() == Some(&SPIRV_MAGIC) && *checksum == checksum_of(words)).then(|| words.to_vec())
+    }
+
+    fn store(&self, key: u64, words: &[u32]) {
+        let Some(path) = self.path(key) else { return };
+        let bytes: Vec<u8> =
+            words.iter().chain([&checksum_of(words)]).flat_map(|word| word.to_le_bytes()).collect();
+        // Written under another name first: two processes may compile the same shader at once.
+        let temporary = path.with_extension(format!("{}.tmp", std::process::id()));
+        let written = path
+            .parent()
+            .map_or(Ok(()), std::fs::create_dir_all)
+            .and_then(|()| std::fs::write(&temporary, bytes))
+            .and_then(|()| std::fs::rename(&temporary, &path));
+        if let Err(error) = written {
+            tracing::debug!("the shader cache was not written: {}: {error}", path.display());
+        }
+    }
+}
+
+fn checksum_of(words: &[u32]) -> u32 {
+    words.iter().fold(0x811c_9dc5, |hash, word| (hash ^ word).wrapping_mul(0x0100_0193))
+}
+
+fn key_of(source: &Source) -> u64 {
+    let mut hasher = std::hash::DefaultHasher::new();
+    (CACHE_VERSION, env!("CARGO_PKG_VERSION"), &source.file, &source.texts).hash(&mut hasher);
+    hasher.finish()
+}
+
+/// Compiles a main file, or takes the result of an earlier run from the cache.
+///
+/// # Errors
+/// [`RendererError::Compile`] with the compiler's messages.
+pub fn compile(source: &Source, cache: &SpirvCache) -> Result<Vec<u32>> {
+    let key = key_of(source);
+    if let Some(words) = cache.load(key) {
+        return Ok(words);
+    }
+    let words = compile_now(source)?;
+    cache.store(key, &words);
+    Ok(words)
+}
+
+/// Serves includes from the texts that were read before.
+struct Includes<'a> {
+    texts: &'a BTreeMap<String, String>,
+}
+
+impl IncludeHandler for Includes<'_> {
+    fn include(&mut self, _: IncludeType, header: &str, _: &str, _: usize) -> Option<IncludeResult> {
+        self.texts.get(header).map(|data| IncludeResult { name: header.to_owned(), data: data.clone() })
+    }
+}
+
+fn compile_now(source: &Source) -> Result<Vec<u32>> {
+    let refuse = |log: String| RendererError::Compile { file: source.file.clone(), log };
+    let compiler = Compiler::acquire().ok_or_else(|| refuse(String::from("glslang did not start")))?;
+    let stage =
+        stage_of(&source.file).ok_or_else(|| refuse(String::from("unknown stage: see the file's ending")))?;
+    let text = source.texts.get(&source.file).cloned().unwrap_or_default();
+    let options = CompilerOptions {
+        source_language: SourceLanguage::GLSL,
+        target: Target::Vulkan { version: VulkanVersion::Vulkan1_3, spirv_version: SpirvVersion::SPIRV1_6 },
+        version_profile: Some((460, GlslProfile::None)),
+        messages: ShaderMessage::DEFAULT | ShaderMessage::CASCADING_ERRORS,
+    };
+    let glsl = ShaderSource::from(text);
+    let mut includes = Includes { texts: &source.texts };
+    let input =
+        ShaderInput::new(&glsl, stage, &options, None::<&[(&str, Option<&str>)]>, Some(&mut includes))
+            .map_err(|error| refuse(readable(&error, &source.file)))?;
+    let shader = compiler.create_shader(input).map_err(|error| refuse(readable(&error, &source.file)))?;
+    shader.compile().map_err(|error| refuse(readable(&error, &source.file)))
+}
+
+fn stage_of(file: &str) -> Option<ShaderStage> {
+    Some(match file.rsplit('.').next()? {
+        "vert" => ShaderStage::Vertex,
+        "frag" => ShaderStage::Fragment,
+        "comp" => ShaderStage::Compute,
+        "rgen" => ShaderStage::RayGeneration,
+        "rchit" => ShaderStage::ClosestHit,
+        "rahit" => ShaderStage::AnyHit,
+        "rmiss" => ShaderStage::Miss,
+        "rint" => ShaderStage::Intersect,
+        _ => return None,
+    })
+}
+
+/// The error lines of glslang, with the main file's name in place of the `0` that glslang gives it.
+fn readable(error: &GlslangError, file: &str) -> String {
+    let log = match error {
+        GlslangError::PreprocessError(log)
+        | GlslangError::ParseError(log)
+        | GlslangError::MapIoError(log)
+        | GlslangError::LinkError(log) => log.log.clone(),
+        other => other.to_string(),
+    };
+    let mut lines: Vec<String> = log
+        .lines()
+        .filter(|line| !line.trim().is_empty() && !line.contains("compilation errors"))
+        .map(|line| match line.strip_prefix("ERROR: ") {
+            Some(rest) => {
+                rest.strip_prefix("0:").map_or_else(|| rest.to_owned(), |rest| format!("{file}:{rest}"))
+            }
+            None => line.to_owned(),
+        })
+        .collect();
+    lines.dedup();
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+    use super::*;
+
+    fn source(text: &str) -> Source {
+        let texts =
+            [("test.comp", text), ("lib/a.glsl", "float a() { return 1.0; }\nfloat b() { return oops; }\n")];
+        let texts = texts.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect();
+        Source { file: String::from("test.comp"), texts }
+    }
+
+    #[test]
+    fn errors_name_file_and_line() {
+        let error =
+            compile_now(&source("#version 460\nvoid main() {\n  int x = y;\n}\n")).unwrap_err().to_string();
+        assert!(error.contains("test.comp:3:"), "{error}");
+        let text = "#version 460\n#extension GL_GOOGLE_include_directive : require\n#include \"lib/a.glsl\"\nvoid main() {}\n";
+        let error = compile_now(&source(text)).unwrap_err().to_string();
+        assert!(error.contains("lib/a.glsl:2:"), "{error}");
+    }
+
+    #[test]
+    fn the_cache_gives_back_what_was_compiled_and_ignores_damage() {
+        let folder = std::env::temp_dir().join(format!("caustica-spirv-{}", std::process::id()));
+        let cache = SpirvCache::at(folder.clone());
+        let good = source("#version 460\nlayout(local_size_x = 1) in;\nvoid main() {}\n");
+        let words = compile(&good, &cache).unwrap();
+        assert_eq!(cache.load(key_of(&good)), Some(words.clone()));
+        let path = cache.path(key_of(&good)).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        bytes[20] ^= 0xff;
+        std::fs::write(&path, bytes).unwrap();
+        assert_eq!(cache.load(key_of(&good)), None);
+        assert_eq!(compile(&good, &cache).unwrap(), words);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -1,0 +1,125 @@
+//! What a stage binds, read from its SPIR-V. Set 0 is the scene and must fit `shaders/shared/scene.glsl`;
+//! set 1 is given to the host by name. A binding that does not fit is refused before the driver sees it:
+//! validation does not catch it reliably, and some drivers crash.
+
+use caustica_gpu::{Access, Binding, BindingKind, Interface};
+use spirq::ReflectConfig;
+use spirq::ty::{AccessType, DescriptorType};
+use spirq::var::Variable;
+
+use crate::error::{RendererError, Result};
+
+/// Interface of one stage.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reflection {
+    /// What it binds.
+    pub interface: Interface,
+}
+
+/// Bindings of set 0: number, kind, and what it is.
+const SCENE_BINDINGS: [(u32, DescriptorType, &str); 3] = [
+    (0, DescriptorType::AccelStruct(), "the acceleration structure"),
+    (1, DescriptorType::CombinedImageSampler(), "the textures"),
+    (2, DescriptorType::CombinedImageSampler(), "the environment map"),
+];
+
+/// Reads the interface of a module that `compile` made from `file`.
+///
+/// # Errors
+/// [`RendererError::Interface`] when a binding does not fit the host's layout.
+pub fn reflect(file: &str, words: &[u32]) -> Result<Reflection> {
+    let refuse = |reason: String| RendererError::Interface { file: file.to_owned(), reason };
+    let entry_points = ReflectConfig::new()
+        .spv(without_boolean_spec_ops(words))
+        .ref_all_rscs(false)
+        .combine_img_samplers(false)
+        .reflect()
+        .map_err(|error| refuse(format!("reflection failed: {error}")))?;
+    let entry = entry_points.first().ok_or_else(|| refuse(String::from("no entry point")))?;
+    let mut interface = Interface::default();
+    for variable in &entry.vars {
+        match variable {
+            Variable::Descriptor { name, desc_bind, desc_ty, .. } => {
+                let name = name.clone().unwrap_or_default();
+                match desc_bind.set() {
+                    0 => check_scene_binding(file, &name, desc_bind.bind(), desc_ty)?,
+                    1 => interface.bindings.push(Binding {
+                        kind: kind_of(desc_ty)
+                            .ok_or_else(|| refuse(format!("'{name}' is of an unknown kind")))?,
+                        binding: desc_bind.bind(),
+                        name,
+                    }),
+                    set => return Err(refuse(format!("'{name}' is in set {set}; only 0 and 1 exist"))),
+                }
+                interface.uses_scene |= desc_bind.set() == 0;
+            }
+            Variable::PushConstant { ty, .. } => {
+                interface.push_bytes = ty.nbyte().unwrap_or(size_of::<crate::gpu_types::Push>()) as u32;
+            }
+            _ => {}
+        }
+    }
+    let expected = size_of::<crate::gpu_types::Push>() as u32;
+    if interface.push_bytes > expected {
+        let found = interface.push_bytes;
+        return Err(refuse(format!("push constants: expected at most {expected} bytes, found {found}")));
+    }
+    interface.bindings.sort_by_key(|binding| binding.binding);
+    Ok(Reflection { interface })
+}
+
+/// Replaces boolean expressions of specialisation constants by `true`: spirq evaluates them and does not know every
+/// operator, and no binding depends on them.
+fn without_boolean_spec_ops(words: &[u32]) -> Vec<u32> {
+    const HEADER_WORDS: usize = 5;
+    const OP_NOP: u32 = 1;
+    const OP_TYPE_BOOL: u32 = 20;
+    const OP_CONSTANT_TRUE: u32 = 41;
+    const OP_SPEC_CONSTANT_OP: u32 = 52;
+    let mut result = words.to_vec();
+    let mut bool_types = Vec::new();
+    let mut at = HEADER_WORDS;
+    while let Some(&first) = words.get(at) {
+        let (length, opcode) = ((first >> 16) as usize, first & 0xffff);
+        if length == 0 || at + length > words.len() {
+            break;
+        }
+        match (opcode, words.get(at + 1)) {
+            (OP_TYPE_BOOL, Some(id)) => bool_types.push(*id),
+            (OP_SPEC_CONSTANT_OP, Some(kind)) if bool_types.contains(kind) => {
+                result[at] = (3 << 16) | OP_CONSTANT_TRUE;
+                result[at + 3..at + length].fill((1 << 16) | OP_NOP);
+            }
+            _ => {}
+        }
+        at += length;
+    }
+    result
+}
+
+fn check_scene_binding(file: &str, name: &str, binding: u32, found: &DescriptorType) -> Result<()> {
+    let reason = match SCENE_BINDINGS.iter().find(|(number, ..)| *number == binding) {
+        Some((_, expected, _)) if expected == found => return Ok(()),
+        Some((_, expected, what)) => {
+            format!("'{name}' at set 0, binding {binding} ({what}): expected {expected:?}, found {found:?}")
+        }
+        None => format!("'{name}' at set 0, binding {binding}: the scene has no such binding"),
+    };
+    Err(RendererError::Interface { file: file.to_owned(), reason })
+}
+
+fn kind_of(descriptor: &DescriptorType) -> Option<BindingKind> {
+    let access = |access: &AccessType| match access {
+        AccessType::ReadOnly => Access::StorageRead,
+        AccessType::WriteOnly => Access::StorageWrite,
+        AccessType::ReadWrite => Access::StorageReadWrite,
+    };
+    Some(match descriptor {
+        DescriptorType::SampledImage() => BindingKind::SampledImage,
+        DescriptorType::CombinedImageSampler() => BindingKind::CombinedImage,
+        DescriptorType::StorageImage(a) => BindingKind::StorageImage(access(a)),
+        DescriptorType::StorageBuffer(a) => BindingKind::StorageBuffer(access(a)),
+        DescriptorType::AccelStruct() => BindingKind::AccelStructure,
+        _ => return None,
+    })
+}

@@ -1,0 +1,105 @@
+//! GLSL files by their path inside `shaders/`. Enters: the embedded copy, or a folder. Leaves: text and the files that
+//! a main file includes. Paths never leave the folder.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use include_dir::{Dir, include_dir};
+
+use crate::error::{RendererError, Result};
+
+/// The shaders as they were when this binary was built.
+static EMBEDDED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../shaders");
+
+/// Where shaders are read from.
+#[derive(Clone, Debug, Default)]
+pub struct ShaderSources {
+    folder: Option<PathBuf>,
+}
+
+/// A main file with everything it includes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Path of the main file, such as `passes/shadow/shadow.rgen`.
+    pub file: String,
+    /// Text of the main file and of every included file, by path.
+    pub texts: BTreeMap<String, String>,
+}
+
+impl ShaderSources {
+    /// Reads from `folder`, or from the copy in the binary when it is `None`.
+    pub fn new(folder: Option<PathBuf>) -> Self {
+        Self { folder }
+    }
+
+    /// Reads one file.
+    ///
+    /// # Errors
+    /// [`RendererError::Source`] when it is missing, unreadable or outside of the folder.
+    pub fn read(&self, file: &str) -> Result<String> {
+        let refuse = |reason: String| RendererError::Source { file: file.to_owned(), reason };
+        if file.split('/').any(|part| part == ".." || part.is_empty()) {
+            return Err(refuse(String::from("a shader path must stay inside the shader folder")));
+        }
+        match &self.folder {
+            Some(folder) => {
+                std::fs::read_to_string(folder.join(file)).map_err(|error| refuse(error.to_string()))
+            }
+            None => EMBEDDED
+                .get_file(file)
+                .and_then(include_dir::File::contents_utf8)
+                .map(str::to_owned)
+                .ok_or_else(|| refuse(String::from("no such file in the built-in shaders"))),
+        }
+    }
+
+    /// Reads a main file and follows its includes.
+    ///
+    /// # Errors
+    /// [`RendererError::Source`] naming the file that is missing.
+    pub fn load(&self, file: &str) -> Result<Source> {
+        let mut texts = BTreeMap::new();
+        let mut waiting = vec![file.to_owned()];
+        while let Some(next) = waiting.pop() {
+            if texts.contains_key(&next) {
+                continue;
+            }
+            let text = self.read(&next).map_err(|error| match error {
+                RendererError::Source { file: missing, reason } if missing != file => RendererError::Source {
+                    file: file.to_owned(),
+                    reason: format!("include \"{missing}\": {reason}"),
+                },
+                other => other,
+            })?;
+            waiting.extend(includes_of(&text).map(str::to_owned));
+            texts.insert(next, text);
+        }
+        Ok(Source { file: file.to_owned(), texts })
+    }
+}
+
+/// Paths named by `#include "..."` lines.
+fn includes_of(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| {
+        let rest = line.trim_start().strip_prefix('#')?.trim_start().strip_prefix("include")?.trim_start();
+        rest.strip_prefix('"')?.split('"').next()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn includes_are_found_whatever_the_spacing() {
+        let text =
+            "#include \"a.glsl\"\n  #  include  \"b/c.glsl\" // why\n// #include \"no.glsl\"\n#define X\n";
+        assert_eq!(includes_of(text).collect::<Vec<_>>(), ["a.glsl", "b/c.glsl"]);
+    }
+
+    #[test]
+    fn paths_stay_inside_the_folder() {
+        assert!(ShaderSources::default().read("../Cargo.toml").is_err());
+        assert!(ShaderSources::default().read("/etc/hostname").is_err());
+    }
+}

@@ -1,0 +1,308 @@
+//! Instances: stable slots, transforms with their predecessors, and the material of every (instance, geometry).
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use caustica_gpu::{Device, Recorder};
+use glam::{Affine3A, Mat3A, Vec3A};
+
+use super::materials::Materials;
+use super::meshes::{Meshes, rows_of};
+use super::table::Table;
+use crate::delta::{Instance, InstanceId, MaterialId, MeshId};
+use crate::error::{RendererError, Result};
+use crate::gpu_types::{self, INSTANCE_MIRRORED, Rows};
+
+/// What the host knows of one instance.
+pub(crate) struct Slot {
+    pub(crate) id: InstanceId,
+    pub(crate) instance: Instance,
+    /// Not finite or singular: no acceleration structure, not drawn.
+    pub(crate) degenerate: bool,
+    material_base: u32,
+    geometry_count: u32,
+}
+
+/// All instances, by slot.
+pub(crate) struct Instances {
+    table: Table<gpu_types::Instance>,
+    material_slots: Table<u32>,
+    by_id: BTreeMap<InstanceId, u32>,
+    slots: Vec<Option<Slot>>,
+    free_slots: Vec<u32>,
+    /// Free ranges of material slots, by their length.
+    free_ranges: BTreeMap<u32, Vec<u32>>,
+    moved_last_frame: BTreeSet<u32>,
+}
+
+impl Instances {
+    pub(crate) fn new(device: &Arc<Device>) -> Self {
+        Self {
+            table: Table::new(device, "instances"),
+            material_slots: Table::new(device, "material slots"),
+            by_id: BTreeMap::new(),
+            slots: Vec::new(),
+            free_slots: Vec::new(),
+            free_ranges: BTreeMap::new(),
+            moved_last_frame: BTreeSet::new(),
+        }
+    }
+
+    /// Adds an instance, or changes it.
+    pub(crate) fn set(
+        &mut self,
+        id: InstanceId,
+        instance: &Instance,
+        meshes: &Meshes,
+        materials: &Materials,
+    ) -> Result<()> {
+        let mesh = meshes.get(instance.mesh)?;
+        let count = mesh.geometry_count();
+        if instance.materials.len() != count as usize {
+            let (asked, limit) = (instance.materials.len() as u64, u64::from(count));
+            return Err(RendererError::Limit {
+                what: String::from("materials of an instance"),
+                asked,
+                limit,
+            });
+        }
+        let indices: Vec<u32> =
+            instance.materials.iter().map(|m| materials.index(*m)).collect::<Result<_>>()?;
+        let known = self.by_id.get(&id).copied();
+        let (slot, old) = match known {
+            Some(slot) => (slot, self.slots[slot as usize].take()),
+            None => (self.free_slots.pop().unwrap_or(self.slots.len() as u32), None),
+        };
+        if slot as usize >= self.slots.len() {
+            self.slots.resize_with(slot as usize + 1, || None);
+        }
+        let material_base = match old {
+            Some(old) if old.geometry_count == count => old.material_base,
+            Some(old) => {
+                self.free_range(old.material_base, old.geometry_count);
+                self.take_range(count)
+            }
+            None => self.take_range(count),
+        };
+        for (i, index) in indices.into_iter().enumerate() {
+            self.material_slots.set(material_base as usize + i, index);
+        }
+        let previous =
+            known.and_then(|_| self.table.get(slot as usize)).map(|record| record.render_from_mesh);
+        let transform = &instance.render_from_mesh;
+        let degenerate = is_degenerate(transform);
+        let mut record = gpu_types::Instance {
+            geometries: mesh.geometries_address(),
+            material_base,
+            geometry_count: count,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        place(&mut record, transform, previous);
+        if previous.is_some_and(|previous| previous != record.render_from_mesh) {
+            self.moved_last_frame.insert(slot);
+        }
+        self.table.set(slot as usize, record);
+        self.by_id.insert(id, slot);
+        self.slots[slot as usize] =
+            Some(Slot { id, instance: instance.clone(), degenerate, material_base, geometry_count: count });
+        Ok(())
+    }
+
+    /// Moves an instance. Returns its slot; `None` when only its degenerate state hides it as before.
+    ///
+    /// # Errors
+    /// When the id is not in the table.
+    pub(crate) fn set_transform(&mut self, id: InstanceId, transform: Affine3A) -> Result<Option<u32>> {
+        let unknown = || RendererError::Unknown { what: "instance", id: format!("{}/{}", id.node, id.part) };
+        let slot = *self.by_id.get(&id).ok_or_else(unknown)?;
+        let entry = self.slots[slot as usize].as_mut().ok_or_else(unknown)?;
+        let mut record = *self.table.get(slot as usize).ok_or_else(unknown)?;
+        entry.instance.render_from_mesh = transform;
+        entry.degenerate = is_degenerate(&transform);
+        let previous = record.render_from_mesh;
+        place(&mut record, &transform, Some(previous));
+        self.table.set(slot as usize, record);
+        self.moved_last_frame.insert(slot);
+        Ok(Some(slot))
+    }
+
+    pub(crate) fn remove(&mut self, id: InstanceId) {
+        let Some(slot) = self.by_id.remove(&id) else { return };
+        if let Some(old) = self.slots[slot as usize].take() {
+            self.free_range(old.material_base, old.geometry_count);
+        }
+        self.table.set(slot as usize, bytemuck::Zeroable::zeroed());
+        self.moved_last_frame.remove(&slot);
+        self.free_slots.push(slot);
+    }
+
+    /// Points the instances of changed meshes at the new records.
+    pub(crate) fn follow_meshes(&mut self, changed: &[MeshId], meshes: &Meshes) -> Result<()> {
+        let changed: BTreeSet<MeshId> = changed.iter().copied().collect();
+        for (slot, entry) in self.slots.iter().enumerate() {
+            let Some(entry) = entry.as_ref().filter(|entry| changed.contains(&entry.instance.mesh)) else {
+                continue;
+            };
+            let address = meshes.get(entry.instance.mesh)?.geometries_address();
+            if let Some(record) = self.table.get(slot).copied().filter(|record| record.geometries != address)
+            {
+                self.table.set(slot, gpu_types::Instance { geometries: address, ..record });
+            }
+        }
+        Ok(())
+    }
+
+    /// A frame has gone by: what moved in it stands still until it moves again.
+    pub(crate) fn settle(&mut self) {
+        for slot in std::mem::take(&mut self.moved_last_frame) {
+            if let Some(record) = self.table.get(slot as usize).copied() {
+                let previous_render_from_mesh = record.render_from_mesh;
+                self.table.set(slot as usize, gpu_types::Instance { previous_render_from_mesh, ..record });
+            }
+        }
+    }
+
+    /// Slots in use with their instance.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, &Slot)> {
+        self.slots.iter().enumerate().filter_map(|(i, slot)| slot.as_ref().map(|slot| (i as u32, slot)))
+    }
+
+    pub(crate) fn get(&self, slot: u32) -> Option<&Slot> {
+        self.slots.get(slot as usize).and_then(Option::as_ref)
+    }
+
+    pub(crate) fn slot_of(&self, id: InstanceId) -> Option<u32> {
+        self.by_id.get(&id).copied()
+    }
+
+    /// Every material in use, with repetitions.
+    pub(crate) fn materials_in_use(&self) -> impl Iterator<Item = MaterialId> {
+        self.iter().flat_map(|(_, slot)| slot.instance.materials.iter().copied())
+    }
+
+    pub(crate) fn is_mirrored(&self, slot: u32) -> bool {
+        self.table.get(slot as usize).is_some_and(|record| record.flags & INSTANCE_MIRRORED != 0)
+    }
+
+    /// Number of slots, free ones among them.
+    pub(crate) fn slot_count(&self) -> u32 {
+        self.slots.len() as u32
+    }
+
+    /// Number of instances.
+    pub(crate) fn len(&self) -> usize {
+        self.by_id.len()
+    }
+
+    pub(crate) fn address(&self) -> u64 {
+        self.table.address()
+    }
+
+    pub(crate) fn material_slots_address(&self) -> u64 {
+        self.material_slots.address()
+    }
+
+    pub(crate) fn is_dirty(&self) -> bool {
+        self.table.is_dirty() || self.material_slots.is_dirty()
+    }
+
+    pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
+        self.table.flush(recorder)?;
+        self.material_slots.flush(recorder)
+    }
+
+    fn take_range(&mut self, count: u32) -> u32 {
+        let free = self.free_ranges.get_mut(&count).and_then(Vec::pop);
+        free.unwrap_or_else(|| {
+            let start = self.material_slots.len() as u32;
+            if count > 0 {
+                self.material_slots.set((start + count) as usize - 1, 0);
+            }
+            start
+        })
+    }
+
+    fn free_range(&mut self, start: u32, count: u32) {
+        self.free_ranges.entry(count).or_default().push(start);
+    }
+}
+
+/// Fills in what follows from the transform.
+fn place(record: &mut gpu_types::Instance, transform: &Affine3A, previous: Option<Rows>) {
+    record.render_from_mesh = rows_of(transform);
+    record.previous_render_from_mesh = previous.unwrap_or(record.render_from_mesh);
+    record.normal_from_mesh = rows_of(&Affine3A::from_mat3(cofactor(&transform.matrix3).into()));
+    record.flags = if transform.matrix3.determinant() < 0.0 { INSTANCE_MIRRORED } else { 0 };
+}
+
+/// The cofactor matrix, scaled so that its largest entry is 1: it turns normals whatever the scale, mirrored and
+/// flattened maps too, where the inverse transpose does not exist.
+fn cofactor(m: &Mat3A) -> Mat3A {
+    // The linear part is scaled first, so that tiny and huge scales neither underflow nor overflow.
+    let largest = |m: &Mat3A| m.x_axis.abs().max(m.y_axis.abs()).max(m.z_axis.abs()).max_element();
+    let scale = largest(m);
+    if !(scale.is_finite() && scale > 0.0) {
+        return Mat3A::IDENTITY;
+    }
+    let (a, b, c) = (m.x_axis / scale, m.y_axis / scale, m.z_axis / scale);
+    let result = Mat3A::from_cols(b.cross(c), c.cross(a), a.cross(b));
+    let largest = largest(&result);
+    if largest > 0.0 {
+        Mat3A::from_cols(result.x_axis / largest, result.y_axis / largest, result.z_axis / largest)
+    } else {
+        result
+    }
+}
+
+/// A map that no acceleration structure may hold: not finite, or it flattens space. The test does not depend on the
+/// scale: it compares the volume with the product of the edges.
+pub(crate) fn is_degenerate(map: &Affine3A) -> bool {
+    if !map.is_finite() {
+        return true;
+    }
+    let m = map.matrix3;
+    let length = |v: Vec3A| v.as_dvec3().length();
+    let edges = length(m.x_axis) * length(m.y_axis) * length(m.z_axis);
+    let volume = m.x_axis.as_dvec3().cross(m.y_axis.as_dvec3()).dot(m.z_axis.as_dvec3()).abs();
+    !(edges > 0.0 && volume > 1e-7 * edges)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Quat, Vec3};
+
+    #[test]
+    fn normals_stay_perpendicular_under_mirror_and_anisotropy() {
+        for scale in [
+            Vec3::new(-1.0, 1.0, 1.0),
+            Vec3::new(1e-3, 1e3, 1.0),
+            Vec3::new(1e-6, 1.0, 1.0),
+            Vec3::splat(1e-9),
+        ] {
+            let map = Affine3A::from_scale_rotation_translation(scale, Quat::from_rotation_y(0.3), Vec3::X);
+            let (normal, tangent) =
+                (Vec3A::new(1.0, 2.0, -1.0).normalize(), Vec3A::new(2.0, -1.0, 0.0).normalize());
+            let n = (cofactor(&map.matrix3) * normal).normalize();
+            let t = (map.matrix3 * tangent).normalize();
+            assert!(n.dot(t).abs() < 1e-6, "{scale}: {}", n.dot(t));
+        }
+    }
+
+    #[test]
+    fn the_naive_inverse_transpose_fails_where_the_cofactor_holds() {
+        let flat = Mat3A::from_diagonal(Vec3::new(1.0, 0.0, 1.0));
+        assert!(!flat.inverse().transpose().is_finite());
+        assert_eq!(cofactor(&flat) * Vec3A::Y, Vec3A::Y);
+    }
+
+    #[test]
+    fn degenerate_maps_are_found_at_every_scale() {
+        for scale in [1e-12, 1e-3, 1.0, 1e9] {
+            assert!(!is_degenerate(&Affine3A::from_scale(Vec3::splat(scale))), "{scale}");
+            assert!(is_degenerate(&Affine3A::from_scale(Vec3::new(scale, 0.0, scale))), "{scale}");
+        }
+        assert!(is_degenerate(&Affine3A::from_translation(Vec3::new(f32::NAN, 0.0, 0.0))));
+        assert!(is_degenerate(&Affine3A::from_scale(Vec3::splat(f32::INFINITY))));
+    }
+}

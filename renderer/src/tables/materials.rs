@@ -1,0 +1,199 @@
+//! Materials on the device, and what `needs` asks of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use caustica_gpu::{Device, Recorder};
+use glam::Vec3;
+
+use super::table::Table;
+use super::textures::Textures;
+use crate::delta::{self, AlphaMode, MaterialId, ShadingMode};
+use crate::error::{RendererError, Result};
+use crate::gpu_types::{
+    self, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_DOUBLE_SIDED, MATERIAL_HAS_VOLUME, MODE_PBR,
+    MODE_REFLECTIVE, MODE_REFRACTIVE, MODE_UNLIT, NO_TEXTURE,
+};
+
+/// All materials, by id.
+pub(crate) struct Materials {
+    table: Table<gpu_types::Material>,
+    by_id: BTreeMap<MaterialId, (u32, delta::Material)>,
+    free: Vec<u32>,
+}
+
+impl Materials {
+    pub(crate) fn new(device: &Arc<Device>) -> Self {
+        Self { table: Table::new(device, "materials"), by_id: BTreeMap::new(), free: Vec::new() }
+    }
+
+    /// Index in the shader's table.
+    pub(crate) fn index(&self, id: MaterialId) -> Result<u32> {
+        let unknown = || RendererError::Unknown { what: "material", id: id.0.to_string() };
+        self.by_id.get(&id).map(|(index, _)| *index).ok_or_else(unknown)
+    }
+
+    pub(crate) fn get(&self, id: MaterialId) -> Option<&delta::Material> {
+        self.by_id.get(&id).map(|(_, material)| material)
+    }
+
+    /// Sets a material; true when whether rays may pass through it, or how its faces are culled, has changed.
+    pub(crate) fn set(&mut self, id: MaterialId, material: &delta::Material, textures: &Textures) -> bool {
+        let old = self.by_id.get(&id);
+        let flipped = old.is_some_and(|(_, old)| {
+            is_opaque(old) != is_opaque(material)
+                || shows_both_sides(old) != shows_both_sides(material)
+                || has_alpha(old) != has_alpha(material)
+        });
+        let index = match old {
+            Some((index, _)) => *index,
+            None => self.free.pop().unwrap_or(self.table.len() as u32),
+        };
+        self.table.set(index as usize, pack(material, textures));
+        self.by_id.insert(id, (index, material.clone()));
+        flipped
+    }
+
+    pub(crate) fn remove(&mut self, id: MaterialId) {
+        if let Some((index, _)) = self.by_id.remove(&id) {
+            self.free.push(index);
+        }
+    }
+
+    pub(crate) fn address(&self) -> u64 {
+        self.table.address()
+    }
+
+    pub(crate) fn is_dirty(&self) -> bool {
+        self.table.is_dirty()
+    }
+
+    pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
+        self.table.flush(recorder)
+    }
+}
+
+/// Whether any-hit never needs to be called for a surface.
+pub(crate) fn is_opaque(material: &delta::Material) -> bool {
+    !transmits(material) && !has_alpha(material)
+}
+
+/// Whether the surface has holes or coverage by alpha.
+pub(crate) fn has_alpha(material: &delta::Material) -> bool {
+    material.alpha != AlphaMode::Opaque
+}
+
+/// Whether light passes through the surface.
+pub(crate) fn transmits(material: &delta::Material) -> bool {
+    match material.mode {
+        ShadingMode::Refractive => true,
+        ShadingMode::Pbr => material.transmission > 0.0,
+        ShadingMode::Reflective | ShadingMode::Unlit => false,
+    }
+}
+
+/// Whether back faces are seen by the camera.
+pub(crate) fn shows_both_sides(material: &delta::Material) -> bool {
+    material.double_sided || transmits(material)
+}
+
+/// Whether the surface emits light.
+pub(crate) fn emits(material: &delta::Material) -> bool {
+    material.emissive.max_element() > 0.0
+}
+
+fn pack(material: &delta::Material, textures: &Textures) -> gpu_types::Material {
+    let mut flags = 0;
+    let mut alpha_cutoff = 0.5;
+    if material.double_sided {
+        flags |= MATERIAL_DOUBLE_SIDED;
+    }
+    if material.has_volume {
+        flags |= MATERIAL_HAS_VOLUME;
+    }
+    match material.alpha {
+        AlphaMode::Opaque => {}
+        AlphaMode::Mask { cutoff } => {
+            flags |= MATERIAL_ALPHA_MASK;
+            alpha_cutoff = cutoff;
+        }
+        AlphaMode::Blend => flags |= MATERIAL_ALPHA_BLEND,
+    }
+    let texture = |used: &Option<delta::TextureUse>| pack_texture(used.as_ref(), textures);
+    gpu_types::Material {
+        base_color: material.base_color.to_array(),
+        emissive: material.emissive.to_array(),
+        metallic: material.metallic,
+        specular_color: material.specular_color.to_array(),
+        specular: material.specular,
+        attenuation_per_m: attenuation_per_m(material).to_array(),
+        roughness: material.roughness,
+        normal_scale: material.normal_scale,
+        occlusion_strength: material.occlusion_strength,
+        ior: material.ior,
+        transmission: material.transmission,
+        alpha_cutoff,
+        mode: match material.mode {
+            ShadingMode::Pbr => MODE_PBR,
+            ShadingMode::Reflective => MODE_REFLECTIVE,
+            ShadingMode::Refractive => MODE_REFRACTIVE,
+            ShadingMode::Unlit => MODE_UNLIT,
+        },
+        flags,
+        medium_priority: 0,
+        base_color_texture: texture(&material.base_color_texture),
+        metallic_roughness_texture: texture(&material.metallic_roughness_texture),
+        normal_texture: texture(&material.normal_texture),
+        occlusion_texture: texture(&material.occlusion_texture),
+        emissive_texture: texture(&material.emissive_texture),
+    }
+}
+
+/// Absorption coefficient, 1/m: KHR_materials_volume gives the colour that is left after a distance, so that
+/// sigma = -ln(colour) / distance. A channel of colour 0 absorbs all but e^-64 over the distance.
+fn attenuation_per_m(material: &delta::Material) -> Vec3 {
+    let distance = material.attenuation_distance_m;
+    if !(distance.is_finite() && distance > 0.0) {
+        return Vec3::ZERO;
+    }
+    let sigma = |channel: f32| -channel.clamp(1.6e-28, 1.0).ln() / distance;
+    let c = material.attenuation_color;
+    Vec3::new(sigma(c.x), sigma(c.y), sigma(c.z))
+}
+
+/// KHR_texture_transform as one 2x2 matrix and an offset: uv' = T * R * S * uv with a counter-clockwise rotation in
+/// a space whose v points down, that is (u cos + v sin, -u sin + v cos).
+fn pack_texture(used: Option<&delta::TextureUse>, textures: &Textures) -> gpu_types::TextureUse {
+    let Some(used) = used else {
+        return gpu_types::TextureUse {
+            texture: NO_TEXTURE,
+            tex_coord: 0,
+            offset: [0.0; 2],
+            linear: [1.0, 0.0, 0.0, 1.0],
+        };
+    };
+    let (sin, cos) = used.rotation_rad.sin_cos();
+    gpu_types::TextureUse {
+        texture: textures.slot(used.texture),
+        tex_coord: used.tex_coord,
+        offset: used.offset.to_array(),
+        linear: [cos * used.scale.x, sin * used.scale.y, -sin * used.scale.x, cos * used.scale.y],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attenuation_leaves_the_colour_after_the_distance() {
+        let material = delta::Material {
+            attenuation_color: Vec3::new(0.25, 1.0, 0.0),
+            attenuation_distance_m: 2.0,
+            ..Default::default()
+        };
+        let left = (-attenuation_per_m(&material) * 2.0).exp();
+        assert!((left - Vec3::new(0.25, 1.0, 0.0)).abs().max_element() < 1e-6);
+        assert_eq!(attenuation_per_m(&delta::Material::default()), Vec3::ZERO);
+    }
+}

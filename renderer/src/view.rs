@@ -1,0 +1,217 @@
+//! A view: one camera, one choice of pipeline, its targets, its history and its frame counter.
+//! Moving a view's camera resets that view alone; an edit of the scene resets all of them.
+
+mod camera;
+mod targets;
+
+use std::sync::Arc;
+
+use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse};
+
+pub(crate) use camera::{CameraMatrices, jitter_px};
+pub(crate) use targets::Targets;
+
+use crate::accumulation::Accumulation;
+use crate::delta::{Camera, Invalidation};
+use crate::error::Result;
+use crate::gpu_types::AccumulatorPixel;
+use crate::measure::Statistics;
+use crate::needs::Needs;
+use crate::settings::ViewSettings;
+
+/// Names a view of a renderer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ViewId(pub(crate) u32);
+
+/// One view of the scene.
+pub struct View {
+    device: Arc<Device>,
+    camera: Camera,
+    settings: ViewSettings,
+    extent: [u32; 2],
+    pub(crate) accumulation: Accumulation,
+    pub(crate) statistics: Statistics,
+    /// Instance slots that are outlined, as a bit set.
+    pub(crate) selection: Vec<u32>,
+    /// Targets of the present extent and needs; made at the first frame.
+    pub(crate) targets: Option<(Needs, Targets)>,
+    pub(crate) accumulator: Option<Buffer>,
+    pub(crate) counters: Counters,
+    /// Camera of the last frame, without jitter.
+    pub(crate) previous: Option<CameraMatrices>,
+    /// Frames rendered; its parity chooses among the history images.
+    pub(crate) frame_count: u64,
+    /// The image goes to a window: the last pass encodes it and draws the outline.
+    window: bool,
+}
+
+/// The device's counters and their copies for the host, one a frame in flight.
+pub(crate) struct Counters {
+    pub(crate) device: Buffer,
+    pub(crate) host: Vec<Buffer>,
+}
+
+impl View {
+    pub(crate) fn new(
+        device: &Arc<Device>,
+        extent: [u32; 2],
+        settings: ViewSettings,
+        window: bool,
+    ) -> Result<Self> {
+        let counter = |location| {
+            Buffer::new(device, "frame counters", 16, BufferUse::General, location, MemoryUse::Staging)
+        };
+        let host = (0..Frames::in_flight())
+            .map(|_| counter(Location::ReadBack))
+            .collect::<std::result::Result<_, _>>()?;
+        Ok(Self {
+            device: Arc::clone(device),
+            camera: Camera::default(),
+            settings,
+            extent: extent.map(|n| n.max(1)),
+            accumulation: Accumulation::default(),
+            statistics: Statistics::default(),
+            selection: Vec::new(),
+            targets: None,
+            accumulator: None,
+            counters: Counters { device: counter(Location::Device)?, host },
+            previous: None,
+            frame_count: 0,
+            window,
+        })
+    }
+
+    /// Size in pixels.
+    pub fn extent(&self) -> [u32; 2] {
+        self.extent
+    }
+
+    /// Settings.
+    pub fn settings(&self) -> &ViewSettings {
+        &self.settings
+    }
+
+    /// Camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Whether the image goes to a window.
+    pub fn is_for_window(&self) -> bool {
+        self.window
+    }
+
+    /// Figures of the last frame.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Samples accumulated.
+    pub fn samples(&self) -> u64 {
+        self.accumulation.samples()
+    }
+
+    /// Starts the sample set at `offset`. Resets the view.
+    pub fn set_sample_offset(&mut self, offset: u64) {
+        self.accumulation.set_offset(offset);
+    }
+
+    /// Moves the camera. Resets the view when it differs from the last one.
+    pub fn set_camera(&mut self, camera: Camera) {
+        if camera != self.camera {
+            self.camera = camera;
+            self.accumulation.invalidate(Invalidation::Camera, "camera");
+        }
+    }
+
+    /// Changes settings. Exposure, tone map, what is shown and the choice of variants keep the samples.
+    pub fn set_settings(&mut self, settings: ViewSettings) {
+        let what = invalidation_of(&self.settings, &settings);
+        let reason = if settings.pipeline == self.settings.pipeline { "render settings" } else { "pipeline" };
+        self.settings = settings;
+        self.accumulation.invalidate(what, reason);
+    }
+
+    /// Changes the size. Resets the view when it differs from the last one.
+    pub fn resize(&mut self, extent: [u32; 2]) {
+        let extent = extent.map(|n| n.max(1));
+        if extent != self.extent {
+            self.extent = extent;
+            self.targets = None;
+            self.accumulator = None;
+            self.accumulation.invalidate(Invalidation::Resize, "size of the view");
+        }
+    }
+
+    /// The tone-mapped image, still linear; `None` before the first frame.
+    pub fn display_image(&self) -> Option<&Image> {
+        self.targets.as_ref().map(|(_, targets)| &targets.display)
+    }
+
+    /// The image encoded for the window; `None` before the first frame and in a view without a window.
+    pub fn window_image(&self) -> Option<&Image> {
+        self.targets.as_ref().and_then(|(_, targets)| targets.window.as_ref())
+    }
+
+    /// Makes targets for these needs unless they are there; the history starts anew with them.
+    pub(crate) fn prepare_targets(&mut self, needs: Needs) -> Result<()> {
+        if self.targets.as_ref().is_none_or(|(made_for, _)| *made_for != needs) {
+            self.targets = None;
+            self.targets =
+                Some((needs, Targets::new(&self.device, self.extent, &needs, &self.settings, self.window)?));
+            self.previous = None;
+        }
+        if self.accumulator.is_none() {
+            let pixels = u64::from(self.extent[0]) * u64::from(self.extent[1]);
+            self.accumulator = Some(Buffer::new(
+                &self.device,
+                "accumulator",
+                pixels * size_of::<AccumulatorPixel>() as u64,
+                BufferUse::General,
+                Location::Device,
+                MemoryUse::Targets,
+            )?);
+            self.accumulation.invalidate(Invalidation::Resize, "size of the view");
+        }
+        Ok(())
+    }
+}
+
+/// What a change of settings costs.
+fn invalidation_of(old: &ViewSettings, new: &ViewSettings) -> Invalidation {
+    let shown_only = ViewSettings {
+        exposure_ev: new.exposure_ev,
+        tone_map: new.tone_map,
+        show: new.show,
+        needs: new.needs,
+        ..old.clone()
+    };
+    if shown_only == *new { Invalidation::Nothing } else { Invalidation::Everything }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::{NeedsMode, Pipeline, Show, ToneMap};
+
+    #[test]
+    fn what_only_changes_the_display_keeps_the_samples() {
+        let old = ViewSettings::default();
+        let kept = ViewSettings {
+            exposure_ev: 2.0,
+            tone_map: ToneMap::Aces,
+            show: Show::Normal,
+            needs: NeedsMode::All,
+            ..old.clone()
+        };
+        assert_eq!(invalidation_of(&old, &kept), Invalidation::Nothing);
+        for changed in [
+            ViewSettings { pipeline: Pipeline::Raster, ..old.clone() },
+            ViewSettings { max_depth: 1, ..old.clone() },
+            ViewSettings { seed: 9, ..old.clone() },
+            ViewSettings { shadow_rays: 2, ..old.clone() },
+        ] {
+            assert_eq!(invalidation_of(&old, &changed), Invalidation::Everything);
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! The images of a view. What its needs leave out is not made.
+
+use std::sync::Arc;
+
+use caustica_gpu::{Device, Format, Image, ImageDesc, ImageUse};
+
+use crate::error::Result;
+use crate::needs::Needs;
+use crate::settings::{Pipeline, ViewSettings};
+
+/// Images that the next frame reads as its past: two of each, taken in turns.
+pub(crate) struct History {
+    pub(crate) diffuse: [Image; 2],
+    pub(crate) specular: [Image; 2],
+}
+
+/// The images of a view.
+pub(crate) struct Targets {
+    pub(crate) id: Image,
+    /// Two when the temporal pass compares with the last frame, else one.
+    pub(crate) normal: Vec<Image>,
+    /// As `normal`.
+    pub(crate) depth: Vec<Image>,
+    pub(crate) base_color: Image,
+    pub(crate) material: Image,
+    pub(crate) motion: Image,
+    pub(crate) emissive: Option<Image>,
+    pub(crate) direct_diffuse: Option<Image>,
+    pub(crate) direct_specular: Option<Image>,
+    pub(crate) history: Option<History>,
+    pub(crate) shaded: Image,
+    pub(crate) display: Image,
+    pub(crate) window: Option<Image>,
+}
+
+impl Targets {
+    pub(crate) fn new(
+        device: &Arc<Device>,
+        extent: [u32; 2],
+        needs: &Needs,
+        settings: &ViewSettings,
+        window: bool,
+    ) -> Result<Self> {
+        let make = |name: &str, format| {
+            Image::new(device, name, ImageDesc { extent, format, mip_levels: 1, usage: ImageUse::Target })
+        };
+        let depth = |name: &str| {
+            if settings.pipeline == Pipeline::Raytraced {
+                return make(name, Format::R32Float);
+            }
+            let desc = ImageDesc { extent, format: Format::Depth32, mip_levels: 1, usage: ImageUse::Depth };
+            Image::new(device, name, desc)
+        };
+        let pasts = if needs.temporal { 2 } else { 1 };
+        let light = needs.direct_light();
+        let history = if needs.temporal && light {
+            let pair = |name: &str| -> Result<[Image; 2]> {
+                Ok([make(name, Format::Rgba32Float)?, make(name, Format::Rgba32Float)?])
+            };
+            Some(History { diffuse: pair("history_diffuse")?, specular: pair("history_specular")? })
+        } else {
+            None
+        };
+        let optional = |wanted: bool, name: &str, format| wanted.then(|| make(name, format)).transpose();
+        Ok(Self {
+            id: make("gbuffer_id", Format::Rgba32Uint)?,
+            normal: (0..pasts)
+                .map(|_| make("gbuffer_normal", Format::Rg32Uint))
+                .collect::<std::result::Result<_, _>>()?,
+            depth: (0..pasts).map(|_| depth("gbuffer_depth")).collect::<std::result::Result<_, _>>()?,
+            base_color: make("gbuffer_base_color", Format::Rgba16Float)?,
+            material: make("gbuffer_material", Format::Rg16Float)?,
+            motion: make("gbuffer_motion", Format::Rg32Float)?,
+            emissive: optional(needs.emission, "gbuffer_emissive", Format::Rgba32Float)?,
+            direct_diffuse: optional(light, "direct_diffuse", Format::Rgba32Float)?,
+            direct_specular: optional(light, "direct_specular", Format::Rgba32Float)?,
+            history,
+            shaded: make("shaded", Format::Rgba32Float)?,
+            display: make("display", Format::Rgba16Float)?,
+            window: optional(window, "window", Format::Rgba16Float)?,
+        })
+    }
+}

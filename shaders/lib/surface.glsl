@@ -1,0 +1,158 @@
+// A surface as the light passes see it. In: Scene, a hit, the direction of travel. Out: Surface: one consistent set of position, normals on
+// the viewer's side, material and spawn offset. Knows no light.
+#ifndef LIB_SURFACE
+#define LIB_SURFACE
+
+#include "shared/scene.glsl"
+#include "lib/basis.glsl"
+#include "lib/brdf.glsl"
+#include "lib/material.glsl"
+#include "lib/random.glsl"
+#include "lib/triangle.glsl"
+
+struct Surface {
+    vec3 position;          // on the triangle, render space
+    float offset_m;         // see lib/ray_offset.glsl
+    vec3 geometric_normal;  // unit, on the viewer's side
+    vec3 shading_normal;    // unit, on the viewer's side; the mirror direction about it stays above the triangle
+    vec3 view;              // unit, towards the viewer
+    vec3 base_color;
+    float occlusion;
+    float metallic;
+    float roughness;
+    vec3 emissive;          // radiance towards the viewer
+    float ior;
+    float transmission;
+    float specular;
+    vec3 specular_color;
+    vec3 attenuation_per_m;
+    uint mode;
+    uint flags;             // of the material
+    bool front;             // the viewer is on the front side
+};
+
+// A shading normal that the viewer can see and about which the mirror direction does not enter the surface: bent as far as needed, no
+// further (after Keller et al., "The Iray Light Transport Simulation and Rendering System", 2017, appendix A.3).
+vec3 consistent_normal(vec3 normal, vec3 geometric_normal, vec3 view) {
+    float facing = dot(normal, view);
+    vec3 mirrored = 2.0 * facing * normal - view;
+    float above = dot(mirrored, geometric_normal);
+    if (facing > 0.0 && above >= 0.0) {
+        return normal;
+    }
+    vec3 grazing = normalize_or(mirrored - min(above, 0.0) * geometric_normal, view);
+    return normalize_or(view + grazing, geometric_normal);
+}
+
+// Shading normal on the front side: interpolated, then mapped. Falls back to the triangle's own.
+vec3 front_normal(vec3 geometric_front, Attributes attributes, vec3 tangent_normal) {
+    vec3 normal = normalize_or(attributes.normal, geometric_front);
+    if (tangent_normal.x == 0.0 && tangent_normal.y == 0.0) {
+        return normal;
+    }
+    vec3 tangent = attributes.tangent - dot(attributes.tangent, normal) * normal;
+    tangent = normalize_or(tangent, basis_around(normal)[0]);
+    vec3 bitangent = attributes.handedness * cross(normal, tangent);
+    return normalize_or(mat3(tangent, bitangent, normal) * tangent_normal, normal);
+}
+
+// What the material says, without position and normals.
+void surface_set_material(inout Surface surface, Material material, vec3 base_color, vec2 metallic_roughness) {
+    surface.base_color = base_color;
+    surface.metallic = metallic_roughness.x;
+    surface.roughness = metallic_roughness.y;
+    surface.ior = material.ior;
+    surface.transmission = NEEDS_REFRACTION ? material.transmission : 0.0;
+    surface.specular = material.specular;
+    surface.specular_color = material.specular_color;
+    surface.attenuation_per_m = material.attenuation_per_m;
+    surface.mode = material.mode;
+    surface.flags = material.flags;
+}
+
+uint material_index(Scene scene, uint instance_slot, uint geometry) {
+    Instance instance = InstanceTable(scene.instances).at[instance_slot];
+    return UintTable(scene.material_slots).at[instance.material_base + geometry];
+}
+
+// Emission leaves the front side, and the back side of double-sided materials. Unlit surfaces show their base colour on both.
+vec3 surface_emission(Material material, TexturePoint point, vec3 base_color, bool front) {
+    if (material.mode == MODE_UNLIT) {
+        return base_color;
+    }
+    return front || material_emits_behind(material) ? material_emissive(material, point) : vec3(0.0);
+}
+
+// Fills a Surface from interpolated attributes: shared by raster, camera rays and secondary rays.
+Surface surface_shade(Material material, SurfacePoint point, bool front, Attributes attributes, TexturePoint textures_at, vec3 view) {
+    Surface surface;
+    surface.position = point.position;
+    surface.offset_m = point.offset_m;
+    surface.view = view;
+    surface.front = front;
+    float side = front ? 1.0 : -1.0;
+    surface.geometric_normal = side * point.normal;
+    vec3 normal = side * front_normal(point.normal, attributes, material_tangent_normal(material, textures_at));
+    surface.shading_normal = consistent_normal(normal, surface.geometric_normal, view);
+    vec3 base_color = material_base_color(material, textures_at, attributes.color).rgb;
+    surface_set_material(surface, material, max(base_color, vec3(0.0)), material_metallic_roughness(material, textures_at));
+    surface.occlusion = material_occlusion(material, textures_at);
+    surface.emissive = surface_emission(material, textures_at, surface.base_color, front);
+    return surface;
+}
+
+#ifndef SURFACE_GRADIENTS
+// Surface at a hit of a secondary ray. travel: unit direction of the ray; cone_width_m: of the ray cone at the hit.
+Surface surface_from_hit(Scene scene, Hit hit, vec3 travel, float cone_width_m) {
+    Triangle triangle = triangle_fetch(scene, hit.instance, hit.geometry, hit.primitive);
+    SurfacePoint point = triangle_point(triangle, hit.barycentric);
+    Attributes attributes = triangle_attributes(scene, hit.instance, triangle, hit.barycentric);
+    Material material = MaterialTable(scene.materials).at[material_index(scene, hit.instance, hit.geometry)];
+    float cosine = dot(point.normal, travel);
+    TexturePoint textures_at;
+    textures_at.uv = attributes.uv;
+    vec2 uv_area = triangle_double_uv_area(triangle) / triangle_double_area(triangle)
+        * (cone_width_m * cone_width_m / abs(cosine));
+    textures_at.uv_area = float[2](uv_area.x, uv_area.y); // infinite or NaN where degenerate or edge-on; sample_texture sorts it out
+    return surface_shade(material, point, cosine < 0.0, attributes, textures_at, -travel);
+}
+
+// Coverage at a hit for any-hit shaders, 0..1. Read at the base level: a mask's edge stays as sharp as it was painted.
+float hit_coverage(Scene scene, Hit hit, Material material) {
+    if ((material.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND)) == 0u) {
+        return 1.0;
+    }
+    Triangle triangle = triangle_fetch(scene, hit.instance, hit.geometry, hit.primitive);
+    Attributes attributes = triangle_attributes(scene, hit.instance, triangle, hit.barycentric);
+    TexturePoint textures_at;
+    textures_at.uv = attributes.uv;
+    textures_at.uv_area = float[2](0.0, 0.0);
+    return material_coverage(material, material_base_color(material, textures_at, attributes.color).a);
+}
+#endif
+
+// A number in [0, 1) that belongs to one triangle as one ray or pixel sees it.
+float coverage_threshold(uint seed, uint instance, uint geometry, uint primitive) {
+    return unit_float(hash_pcg4d(uvec4(seed, instance, geometry, primitive)).x);
+}
+
+// Light passes the surface: smooth glass, or glTF transmission.
+bool surface_transmits(Surface surface) {
+    return NEEDS_REFRACTION && (surface.mode == MODE_REFRACTIVE || (surface.mode == MODE_PBR && surface.transmission > 0.0));
+}
+
+Brdf surface_brdf(Surface surface) {
+    return brdf_from_material(surface.base_color, surface.metallic, surface.roughness, surface.ior, surface.specular,
+        surface.specular_color);
+}
+
+// What direct_diffuse is multiplied with.
+vec3 surface_diffuse_albedo(Surface surface) {
+    return surface.mode == MODE_PBR ? surface.base_color * ((1.0 - surface.metallic) * (1.0 - surface.transmission)) : vec3(0.0);
+}
+
+vec3 surface_spawn(Surface surface, vec3 direction) {
+    return spawn_position(surface.position, surface.geometric_normal, surface.offset_m, direction);
+}
+
+#endif

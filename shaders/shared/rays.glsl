@@ -1,0 +1,34 @@
+// What every ray-tracing stage agrees on: the TLAS, payloads, ray kinds. Host twin: renderer/src/gpu_types.rs (HIT_GROUP_*).
+#ifndef SHARED_RAYS
+#define SHARED_RAYS
+
+#extension GL_EXT_ray_tracing : require
+
+layout(set = 0, binding = 0) uniform accelerationStructureEXT scene_tlas;
+
+// SBT offsets of the ray kinds: hit groups and miss shaders stand in this order; the geometry stride is 0.
+const uint RAY_SURFACE = 0u;
+const uint RAY_SHADOW = 1u;
+
+// Instance masks.
+const uint MASK_ALL = 0xffu;
+
+// Filled by surface.rchit / surface.rmiss. Fixed size, nothing shaded: ray generation does the shading.
+struct SurfacePayload {
+    float t_m;          // below 0: nothing was hit
+    uint instance;
+    uint geometry;
+    uint primitive;
+    vec2 barycentric;   // weights of the second and third vertex
+    uint seed;          // in: for stochastic alpha in surface.rahit
+};
+
+// Filled by shadow.rmiss (visible) and shadow.rahit (tint of refractive surfaces, alpha).
+struct ShadowPayload {
+    vec3 transmittance; // in: 1; multiplied by every refractive surface passed
+    vec3 optical_depth; // in: 0; absorption x distance: +t where a medium is left, -t where it is entered
+    uint visible;       // in: 0; 1 when nothing opaque was in the way
+    uint seed;          // in: for stochastic alpha in shadow.rahit
+};
+
+#endif

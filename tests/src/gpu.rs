@@ -1,0 +1,94 @@
+//! One device a process, one test at a time on it. Enters: nothing. Leaves: a `Session` that, at its end, fails the
+//! test when the validation layer has said anything.
+
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use caustica_gpu::{Device, DeviceOptions, Frames, Instance, InstanceOptions, Requirements};
+
+struct Shared {
+    instance: Arc<Instance>,
+    device: Arc<Device>,
+}
+
+static SHARED: OnceLock<Shared> = OnceLock::new();
+static TURN: Mutex<()> = Mutex::new(());
+
+/// The device, for the length of one test.
+pub struct Session {
+    /// The instance, whose messages are watched.
+    pub instance: Arc<Instance>,
+    /// The device.
+    pub device: Arc<Device>,
+    /// Frames in flight, of this session alone.
+    pub frames: Frames,
+    _turn: MutexGuard<'static, ()>,
+}
+
+/// An instance with the validation layer and synchronisation validation.
+///
+/// # Panics
+/// Without a Vulkan loader or without the layer: a test that validates nothing must not pass.
+pub fn validated_instance() -> Arc<Instance> {
+    let instance =
+        Instance::new(InstanceOptions { validation: true, display: None }).expect("Vulkan does not start");
+    assert!(
+        instance.validation_is_on(),
+        "the validation layer is missing: install vulkan-validationlayers (scripts/setup.sh --test does)"
+    );
+    instance
+}
+
+/// What device the tests ask for: `CAUSTICA_TEST_DEVICE` (name or index), else the best.
+pub fn device_options() -> DeviceOptions {
+    let device = std::env::var("CAUSTICA_TEST_DEVICE").ok();
+    DeviceOptions { requirements: Requirements { device, present: false }, memory_limit_bytes: None }
+}
+
+/// Waits for its turn and gives the device to a test.
+///
+/// # Panics
+/// Without a device that can run Caustica, or without the validation layer.
+pub fn session() -> Session {
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let shared = SHARED.get_or_init(|| {
+        let instance = validated_instance();
+        let device = Device::new(&instance, &device_options()).expect("no device can run the tests");
+        eprintln!("device: {} ({})", device.name(), device.driver());
+        Shared { instance, device }
+    });
+    // What an earlier test of this process has said was that test's failure.
+    drop(shared.instance.take_messages());
+    let frames = Frames::new(&shared.device).expect("no command buffers");
+    Session {
+        instance: Arc::clone(&shared.instance),
+        device: Arc::clone(&shared.device),
+        frames,
+        _turn: turn,
+    }
+}
+
+/// Fails when the validation layer has said anything.
+///
+/// # Panics
+/// With the messages.
+pub fn assert_silent(instance: &Instance) {
+    let messages = instance.take_messages();
+    let text: Vec<String> =
+        messages.iter().map(|message| format!("{}: {}", message.id, message.text)).collect();
+    assert!(text.is_empty(), "{} validation messages:\n{}", text.len(), text.join("\n"));
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        if let Err(error) = self.frames.finish() {
+            eprintln!("the device did not finish: {error}");
+        }
+        if std::thread::panicking() {
+            for message in self.instance.take_messages() {
+                eprintln!("validation: {}: {}", message.id, message.text);
+            }
+        } else {
+            assert_silent(&self.instance);
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! A renderer with one view. Enters: a delta, a camera, settings. Leaves: mean radiance, the display image, figures.
+
+use caustica_renderer::delta::{Camera, SceneDelta};
+use caustica_renderer::{Accumulated, Renderer, RendererOptions, Statistics, View, ViewId, ViewSettings};
+
+use crate::gpu::{Session, session};
+use crate::shader_folder;
+
+/// A renderer, one view, and the device's attention for one test.
+pub struct Studio {
+    /// The renderer.
+    pub renderer: Renderer,
+    /// Its view.
+    pub view: ViewId,
+    // Dropped last: it looks whether the layer has said anything.
+    session: Session,
+}
+
+impl Studio {
+    /// A renderer with an empty scene and a view of `extent`.
+    ///
+    /// # Panics
+    /// When the device cannot.
+    pub fn new(extent: [u32; 2], settings: ViewSettings) -> Self {
+        Self::with_window(extent, settings, false)
+    }
+
+    /// The same; `window`: the view also fills a window image.
+    ///
+    /// # Panics
+    /// When the device cannot.
+    pub fn with_window(extent: [u32; 2], settings: ViewSettings, window: bool) -> Self {
+        let mut session = session();
+        let options = RendererOptions { shaders: Some(shader_folder()) };
+        let mut renderer = Renderer::new(&session.device, &mut session.frames, &options).expect("a renderer");
+        let view = renderer.create_view(extent, settings, window).expect("a view");
+        Self { renderer, view, session }
+    }
+
+    /// A studio with this scene, seen by this camera.
+    ///
+    /// # Panics
+    /// When the device cannot.
+    pub fn of(extent: [u32; 2], settings: ViewSettings, scene: &SceneDelta, camera: Camera) -> Self {
+        let mut studio = Self::new(extent, settings);
+        studio.view_mut().set_camera(camera);
+        studio.apply(scene);
+        studio
+    }
+
+    /// The session, for work beside the renderer's.
+    pub fn session(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
+    /// The view.
+    ///
+    /// # Panics
+    /// When it was removed.
+    pub fn view(&self) -> &View {
+        self.renderer.view(self.view).expect("the view")
+    }
+
+    /// The view, to be changed.
+    ///
+    /// # Panics
+    /// When it was removed.
+    pub fn view_mut(&mut self) -> &mut View {
+        self.renderer.view_mut(self.view).expect("the view")
+    }
+
+    /// Changes the settings of the view.
+    pub fn set(&mut self, change: impl FnOnce(&mut ViewSettings)) {
+        let mut settings = self.view().settings().clone();
+        change(&mut settings);
+        self.view_mut().set_settings(settings);
+    }
+
+    /// Applies a delta without rendering.
+    ///
+    /// # Panics
+    /// When the renderer refuses.
+    pub fn apply(&mut self, delta: &SceneDelta) {
+        let mut recorder = self.session.frames.begin().expect("a frame");
+        self.renderer.apply(&mut recorder, delta).expect("the delta applies");
+        self.session.frames.submit(recorder, None).expect("a submission");
+    }
+
+    /// One frame as the editor makes it: apply, render, submit.
+    ///
+    /// # Panics
+    /// When the renderer refuses.
+    pub fn frame(&mut self, delta: &SceneDelta) {
+        let mut recorder = self.session.frames.begin().expect("a frame");
+        self.renderer.apply(&mut recorder, delta).expect("the delta applies");
+        self.renderer.render(&mut recorder, self.view).expect("the frame renders");
+        self.session.frames.submit(recorder, None).expect("a submission");
+    }
+
+    /// Renders frames without any change.
+    pub fn frames(&mut self, count: u32) {
+        for _ in 0..count {
+            self.frame(&SceneDelta::default());
+        }
+    }
+
+    /// Renders `samples` samples and reads their mean.
+    ///
+    /// # Panics
+    /// When the device fails.
+    pub fn mean(&mut self, samples: u32) -> Accumulated {
+        self.frames(samples);
+        self.read()
+    }
+
+    /// Reads the mean of what was rendered.
+    ///
+    /// # Panics
+    /// When the device fails.
+    pub fn read(&mut self) -> Accumulated {
+        self.renderer.read_back(&mut self.session.frames, self.view).expect("a read-back")
+    }
+
+    /// Reads the tone-mapped, linear image.
+    ///
+    /// # Panics
+    /// When the device fails.
+    pub fn display(&mut self) -> Vec<[f32; 4]> {
+        self.renderer.read_display(&mut self.session.frames, self.view).expect("a read-back")
+    }
+
+    /// Figures of the last frame.
+    ///
+    /// # Panics
+    /// When the view was removed.
+    pub fn statistics(&self) -> Statistics {
+        self.renderer.statistics(self.view).expect("the view").clone()
+    }
+}

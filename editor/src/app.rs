@@ -94,7 +94,7 @@ impl ApplicationHandler<Wakeup> for App {
 
     fn new_events(&mut self, _event_loop: &ActiveEventLoop, cause: StartCause) {
         if let (Some(window), StartCause::ResumeTimeReached { .. }) = (&mut self.window, cause) {
-            window.request_redraw();
+            window.time_reached();
         }
     }
 

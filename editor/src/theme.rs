@@ -109,6 +109,9 @@ pub fn dock_style(style: &Style) -> egui_dock::Style {
     dock.tab_bar.height = 28.0;
     dock.tab_bar.hline_color = colors.window;
     dock.tab_bar.corner_radius = CornerRadius::ZERO;
+    dock.buttons.close_tab_color = colors.line;
+    dock.buttons.close_tab_active_color = colors.text;
+    dock.buttons.close_tab_bg_fill = Color32::TRANSPARENT;
     dock.tab.tab_body.inner_margin = Margin::same(8);
     dock.tab.tab_body.bg_fill = colors.panel;
     dock.tab.tab_body.stroke = Stroke::NONE;

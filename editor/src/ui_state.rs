@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn tops_leave_out_what_moves_with_its_parent() {
         let mut document = Document::new();
-        let mut add = |document: &mut Document, parent| {
+        let add = |document: &mut Document, parent| {
             let (id, edit) = document.add_edit(Node::new("n", NodeKind::Group), parent);
             document.apply(edit).unwrap();
             id

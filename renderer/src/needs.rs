@@ -84,9 +84,9 @@ pub struct Needs {
     pub textures: bool,
     /// Normal maps.
     pub normal_maps: bool,
-    /// Reflection rays.
+    /// Mirrored directions, by rays or (raster) of the environment alone.
     pub reflection: bool,
-    /// Refraction rays.
+    /// Refracted directions, by rays or (raster) of the environment alone.
     pub refraction: bool,
     /// The emissive target.
     pub emission: bool,
@@ -106,7 +106,7 @@ impl Needs {
         let rays = settings.pipeline != Pipeline::Raster;
         let all = settings.needs == NeedsMode::All;
         let roughness_max = (settings.reflection_roughness_max * 1000.0) as u32;
-        let secondary = rays && settings.max_depth > 0;
+        let secondary = settings.max_depth > 0;
         let noisy = !scene.all_lights_hard
             || scene.lights > settings.light_samples
             || scene.emissive_triangles > 0
@@ -136,7 +136,7 @@ impl Needs {
 
     /// Whether the shading pass traces rays of its own.
     pub fn secondary_rays(&self) -> bool {
-        self.reflection || self.refraction
+        self.shadow_rays && (self.reflection || self.refraction)
     }
 
     /// Constants of `shaders/shared/needs.glsl`, in its order.
@@ -173,9 +173,9 @@ impl Needs {
         };
         let list: [(bool, &str, &str); 12] = [
             (
-                self.direct_light(),
-                "shadow pass",
-                "the scene has no light, no emitter and a black environment",
+                rays && self.direct_light(),
+                "shadow rays",
+                if rays { "the scene has no light, no emitter and a black environment" } else { no_rays },
             ),
             (self.lights, "punctual lights", "the scene has none"),
             (self.emissive_lights, "emissive triangles as lights", "no surface emits"),
@@ -183,8 +183,8 @@ impl Needs {
             (self.environment_map || !self.environment, "environment map", "the environment is a constant"),
             (self.textures, "texture look-ups", "no material has a texture"),
             (self.normal_maps, "normal mapping", "no material has a normal map"),
-            (self.reflection, "reflection rays", why_no_secondary("no surface is smooth enough to mirror")),
-            (self.refraction, "refraction rays", why_no_secondary("no surface lets light pass")),
+            (rays && self.reflection, "reflection rays", why_no_secondary("no surface is smooth enough to mirror")),
+            (rays && self.refraction, "refraction rays", why_no_secondary("no surface lets light pass")),
             (self.emission, "emissive target", "no surface emits"),
             (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),
             (
@@ -226,7 +226,7 @@ mod tests {
         assert!(!needs.direct_light() && !needs.secondary_rays() && !needs.any_hit && !needs.temporal);
         let left_out: Vec<_> = needs.left_out(&ViewSettings::default()).into_iter().map(|l| l.what).collect();
         assert!(
-            left_out.contains(&String::from("shadow pass"))
+            left_out.contains(&String::from("shadow rays"))
                 && left_out.contains(&String::from("reflection rays"))
         );
     }

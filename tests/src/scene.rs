@@ -4,8 +4,8 @@ use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
 use caustica_renderer::delta::{
-    Camera, Environment, Geometry, Instance, InstanceId, Light, LightId, Material, MaterialId, Mesh, MeshId,
-    Projection, Sampler, SceneDelta, ShadingMode, Texture, TextureId, TextureUse,
+    AlphaMode, Camera, Environment, Geometry, Instance, InstanceId, Light, LightId, Material, MaterialId,
+    Mesh, MeshId, Projection, Sampler, SceneDelta, ShadingMode, Texture, TextureId, TextureUse,
 };
 use glam::{Affine3A, Vec2, Vec3, Vec4};
 
@@ -245,4 +245,77 @@ pub fn camera_parallel(distance: f32, ymag_m: f32) -> Camera {
         projection: Projection::Orthographic { ymag_m },
         near_m: 0.01,
     }
+}
+
+/// One of everything on a checkered floor: a mirror, a glass ball, a rough metal cube, a smooth plastic ball, a lamp
+/// panel, a ball with holes; a sun, a small and a large lamp. With the camera that sees them all.
+pub fn zoo() -> (Scene, Camera) {
+    let mut scene = Scene::new();
+    let ball = scene.mesh(sphere(0.5, 48));
+    let floor_texture = scene.texture(checker(8, 60, 220));
+    let floor = Material {
+        base_color_texture: Some(plain_use(floor_texture)),
+        metallic: 0.0,
+        roughness: 0.9,
+        ..Material::default()
+    };
+    let lying = Affine3A::from_rotation_x(-std::f32::consts::FRAC_PI_2);
+    scene.put(quad(6.0, 6.0), floor, lying);
+    let at = |x: f32, y: f32, z: f32| Affine3A::from_translation(Vec3::new(x, y, z));
+    let standing = at(0.0, 1.0, -2.0);
+    scene.put(quad(4.0, 2.0), Material { double_sided: true, ..mirror() }, standing);
+    let clear = scene.material(Material {
+        attenuation_color: Vec3::new(0.6, 0.9, 0.7),
+        attenuation_distance_m: 1.0,
+        ..glass(1.5)
+    });
+    scene.place(ball, clear, at(-0.55, 0.5, 0.6));
+    let plastic = scene.material(Material {
+        base_color: Vec4::new(0.7, 0.1, 0.08, 1.0),
+        metallic: 0.0,
+        roughness: 0.2,
+        ..Material::default()
+    });
+    scene.place(ball, plastic, at(0.65, 0.5, 0.3));
+    let gold = Material {
+        base_color: Vec4::new(1.0, 0.77, 0.34, 1.0),
+        metallic: 1.0,
+        roughness: 0.35,
+        ..Material::default()
+    };
+    scene.put(cube(0.8), gold, at(-1.6, 0.4, -0.4) * Affine3A::from_rotation_y(0.5));
+    let holes = scene.texture(Texture {
+        name: String::from("holes"),
+        rgba8: checker(8, 0, 255).rgba8.chunks_exact(4).flat_map(|t| [200, 220, 255, t[0]]).collect(),
+        ..checker(8, 0, 255)
+    });
+    let lace = scene.material(Material {
+        base_color_texture: Some(plain_use(holes)),
+        metallic: 0.0,
+        roughness: 0.8,
+        alpha: AlphaMode::Mask { cutoff: 0.5 },
+        double_sided: true,
+        ..Material::default()
+    });
+    scene.place(ball, lace, at(1.75, 0.5, -0.5) * Affine3A::from_scale(Vec3::new(1.0, 1.0, -1.0)));
+    let lamp = Material {
+        base_color: Vec4::new(0.0, 0.0, 0.0, 1.0),
+        emissive: Vec3::new(2.0, 3.0, 5.0),
+        ..lambert(0.0)
+    };
+    scene.put(quad(0.5, 0.5), lamp, at(2.3, 1.0, -1.2) * Affine3A::from_rotation_y(-0.6));
+    scene.light(Light::Directional {
+        direction: Vec3::new(-0.4, -1.0, -0.5).normalize(),
+        irradiance: Vec3::new(1.5, 1.4, 1.2),
+        angular_radius_rad: 0.01,
+    });
+    scene.light(point_light(Vec3::new(-2.0, 2.2, 1.5), 3.0));
+    scene.light(Light::Point {
+        position: Vec3::new(1.5, 2.5, 2.0),
+        intensity: Vec3::new(4.0, 3.0, 2.0),
+        radius_m: 0.3,
+        range_m: f32::INFINITY,
+    });
+    scene.surround(0.15);
+    (scene, camera_at(Vec3::new(0.3, 1.7, 4.2), Vec3::new(0.1, 0.55, -0.2), 0.75))
 }

@@ -1,7 +1,7 @@
 //! Carries out actions. Enters: an action. Leaves: edits pushed to the session, a moved camera, changed memory.
 
 use caustica_scene::{
-    Camera, Edit, Light, LightKind, Local, Node, NodeId, NodeKind, PrefabId, Projection, Subtree, Target, Trs,
+    Camera, Edit, Environment, Light, LightKind, Local, Node, NodeId, NodeKind, PrefabId, Projection, Target, Trs,
 };
 use glam::{DQuat, DVec3, Vec3};
 
@@ -190,11 +190,19 @@ impl Editor {
     }
 
     fn add(&mut self, node: Node) {
+        self.add_with(node, None);
+    }
+
+    /// Adds a node, together with another edit where one is needed, as one step.
+    fn add_with(&mut self, node: Node, besides: Option<Edit>) {
         let name = self.free_name(&node.name);
         let made = self.session.edit_with(|document| {
-            let id = NodeId(document.allocate_id());
-            let subtree = Subtree::single(id, Node { name, ..node });
-            (id, Edit::AddNode { parent: None, index: usize::MAX, subtree })
+            let (id, add) = document.add_edit(Node { name, ..node }, None);
+            let edit = match besides {
+                Some(besides) => Edit::batch(add.describe(document), vec![add, besides]),
+                None => add,
+            };
+            (id, edit)
         });
         match made {
             Ok(id) => self.selected_new(id),
@@ -220,8 +228,9 @@ impl Editor {
         let size = self.state.view.distance_m;
         let above = at + DVec3::Y * size * 0.4;
         let radius_m = (size * 0.02) as f32;
-        // Bright enough to light the middle of the picture: candela grow with the square of the distance.
-        let intensity = ((size * 0.4).powi(2) * 40.0).max(1e-3) as f32;
+        // A white, rough surface in the middle of the picture comes out white: radiance = lux / pi.
+        let lux = std::f64::consts::PI;
+        let intensity = ((size * 0.4).powi(2) * lux).max(1e-6) as f32;
         let down = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
         let (name, kind, intensity, trs) = match kind {
             NewLight::Point => {
@@ -235,11 +244,17 @@ impl Editor {
             NewLight::Sun => {
                 let kind = LightKind::Directional { angular_radius_rad: 0.00465 };
                 let slanted = DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(-0.9);
-                ("Sun", kind, 10.0, Trs { rotation: slanted, ..Trs::from_translation(above) })
+                ("Sun", kind, lux as f32, Trs { rotation: slanted, ..Trs::from_translation(above) })
             }
         };
         let light = Light { color: Vec3::ONE, intensity, kind };
-        self.add(Node::new(name, NodeKind::Light(light)).with_local(trs));
+        let node = Node::new(name, NodeKind::Light(light)).with_local(trs);
+        let document = self.session.document();
+        // The automatic sky is there because nothing shines; the first light must not turn the rest black.
+        let keeps_sky = document.environment() == &Environment::Auto
+            && document.effective_environment() == Environment::DefaultSky;
+        let sky = keeps_sky.then_some(Edit::SetEnvironment(Environment::DefaultSky));
+        self.add_with(node, sky);
     }
 
     fn add_camera(&mut self) {

@@ -34,6 +34,9 @@ const SLOW_MS: f64 = 40.0;
 /// Longest time without a new picture while there is input.
 const PICTURE_AT_LEAST_EVERY: Duration = Duration::from_millis(250);
 
+/// How often a slow device is asked whether it has finished.
+const DEVICE_POLL: Duration = Duration::from_millis(4);
+
 /// Whether the program goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Next {
@@ -69,6 +72,8 @@ pub(super) struct EditorWindow {
     must_resize: bool,
     occluded: bool,
     redraw_at: Option<Instant>,
+    /// The next picture waits until the device has finished this one.
+    waits_for_device: bool,
     title: String,
     device: Arc<Device>,
     window: Arc<Window>,
@@ -134,6 +139,7 @@ impl EditorWindow {
             must_resize: false,
             occluded: false,
             redraw_at: None,
+            waits_for_device: false,
             title: String::new(),
             device,
             window,
@@ -143,7 +149,18 @@ impl EditorWindow {
     /// Draws a frame soon.
     pub(super) fn request_redraw(&mut self) {
         self.redraw_at = None;
+        self.waits_for_device = false;
         self.window.request_redraw();
+    }
+
+    /// The time that was waited for has come.
+    pub(super) fn time_reached(&mut self) {
+        // A lost device shows itself in the next frame.
+        if self.waits_for_device && self.device.has_finished().is_ok_and(|finished| !finished) {
+            self.redraw_at = Instant::now().checked_add(DEVICE_POLL);
+        } else {
+            self.request_redraw();
+        }
     }
 
     /// Until when nothing has to be done.
@@ -338,7 +355,12 @@ impl EditorWindow {
             let fresh = self.shown.as_ref() == Some(&key) && self.editor.state.view.divisor == 1;
             self.broken.as_ref() != Some(&key) && !(fresh && self.editor.session.is_converged())
         });
-        if repaint_delay.is_zero() || (unfinished && !self.occluded) {
+        let goes_on = unfinished && !self.occluded;
+        if goes_on && self.is_slow() && !repaint_delay.is_zero() {
+            // Never two slow pictures in a row on the queue: panels that react to input would wait for both.
+            self.waits_for_device = true;
+            self.redraw_at = Instant::now().checked_add(DEVICE_POLL);
+        } else if goes_on || repaint_delay.is_zero() {
             self.request_redraw();
         } else {
             self.redraw_at = Instant::now().checked_add(repaint_delay);

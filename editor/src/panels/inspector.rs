@@ -135,7 +135,7 @@ fn vector_field(
         ui.spacing_mut().item_spacing.x = 4.0;
         let width = ((ui.available_width() - 8.0) / 3.0).max(48.0);
         for axis in 0..3 {
-            let letter = RichText::new(["X", "Y", "Z"][axis]).color(axis_color(axis)).small().strong();
+            let letter = RichText::new(["X ", "Y ", "Z "][axis]).color(axis_color(axis)).small().strong();
             let drag = DragValue::new(&mut edited[axis])
                 .speed(speed)
                 .max_decimals(4)

@@ -113,9 +113,10 @@ fn pbr_fields(cx: &Cx<'_>, ui: &mut Ui, material: &mut Material) {
     }
 }
 
+/// A slider from 0 to 1 that leaves room for its figure and an icon.
 fn share_slider(ui: &mut Ui, value: &mut f32) {
-    ui.spacing_mut().slider_width = (ui.available_width() - 72.0).clamp(40.0, 200.0);
-    ui.add(Slider::new(value, 0.0..=1.0).max_decimals(3));
+    ui.spacing_mut().slider_width = (ui.available_width() - 96.0).clamp(32.0, 160.0);
+    ui.add(Slider::new(value, 0.0..=1.0).fixed_decimals(2));
 }
 
 fn ior_field(ui: &mut Ui, ior: &mut f32) {

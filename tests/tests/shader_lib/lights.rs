@@ -76,7 +76,9 @@ fn sphere_lights_are_exact_from_far_and_near() {
         // A uniform sphere lights a point as if all its light came from the centre.
         assert!((at(4) - 1.0).abs() < 2e-3, "{label}: vector irradiance {}", at(4));
         assert!((at(9) * solid_angle - 1.0).abs() < 1e-4, "{label}: pdf {}", at(9));
-        assert!(at(6) < 0.02, "{label}: {} of the samples miss their light", at(6));
+        // A unit vector in single precision is only so sharp: 1e-7 rad.
+        let blurred = 0.005 + 1e-7 * distance / at(0);
+        assert!(at(6) < blurred, "{label}: {} of the samples miss their light", at(6));
         assert!(at(7) < 1e-3, "{label}: {} between sampling and meeting", at(7));
         assert!(at(8) < 1e-5, "{label}: {} off the surface", at(8));
         naive_broken += usize::from(!((at(10) * solid_angle - 1.0).abs() < 0.01));

@@ -83,7 +83,13 @@ pub fn run() -> ExitCode {
         Some(Command::Render(args)) => logged(|| render::run(&args, &cli.device, cli.shaders.clone())),
         Some(Command::Check(args)) => logged(|| check::run(&args)),
         Some(Command::Devices(args)) => logged(|| devices::run(&args)),
-        None => Err(anyhow::anyhow!("the window comes with the next commit; see `caustica render --help`")),
+        None => crate::app::run(crate::app::AppOptions {
+            file: cli.file,
+            device: cli.device.device,
+            shaders: cli.shaders,
+            validation: cli.device.validation,
+        })
+        .map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");

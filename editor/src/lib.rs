@@ -1,8 +1,19 @@
 //! Caustica, the program: a window on a session, and the command line on the same session.
 //! The only package with egui, clap and anyhow.
 
+pub mod app;
+mod camera_control;
 pub mod cli;
 mod default_sky;
-pub mod history;
-pub mod session;
-pub mod sync;
+mod dialogs;
+mod gizmo;
+mod history;
+mod log_buffer;
+mod panels;
+mod projection;
+mod session;
+mod sync;
+mod theme;
+mod ui_renderer;
+mod ui_state;
+mod worker;

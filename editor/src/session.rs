@@ -311,6 +311,14 @@ impl Session {
         Ok(recorder)
     }
 
+    /// Starts a frame that leaves the view's image as it was: the window repaints its panels alone.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn begin_ui_frame(&mut self) -> anyhow::Result<Recorder> {
+        Ok(self.frames.begin()?)
+    }
+
     /// Submits a frame.
     ///
     /// # Errors

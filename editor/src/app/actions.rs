@@ -320,20 +320,20 @@ mod tests {
     #[test]
     fn keys_become_actions_but_not_while_typing() {
         let context = egui::Context::default();
-        let key = |modifiers, key| egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
-        let ask = |event: egui::Event, typing| {
+        let ask = |(modifiers, key): (Modifiers, Key), typing| {
             let mut actions = Vec::new();
-            let input = egui::RawInput { events: vec![event], ..egui::RawInput::default() };
+            let event = |pressed| egui::Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
+            let input = egui::RawInput { events: vec![event(true), event(false)], ..egui::RawInput::default() };
             context.run_ui(input, |ui| actions = pressed(ui.ctx(), typing)).drop_without_applying_deltas();
             actions
         };
         let ctrl = Modifiers { ctrl: true, command: true, ..Modifiers::NONE };
-        assert_eq!(ask(key(ctrl, Key::Z), false), [Action::Undo]);
-        assert_eq!(ask(key(ctrl.plus(Modifiers::SHIFT), Key::Z), false), [Action::Redo]);
-        assert_eq!(ask(key(ctrl, Key::Y), false), [Action::Redo]);
-        assert_eq!(ask(key(PLAIN, Key::G), false), [Action::Tool(Tool::Move)]);
-        assert_eq!(ask(key(PLAIN, Key::G), true), []);
-        assert_eq!(ask(key(ctrl, Key::Z), true), []);
-        assert_eq!(ask(key(ctrl, Key::S), true), [Action::Save]);
+        assert_eq!(ask((ctrl, Key::Z), false), [Action::Undo]);
+        assert_eq!(ask((ctrl.plus(Modifiers::SHIFT), Key::Z), false), [Action::Redo]);
+        assert_eq!(ask((ctrl, Key::Y), false), [Action::Redo]);
+        assert_eq!(ask((PLAIN, Key::G), false), [Action::Tool(Tool::Move)]);
+        assert_eq!(ask((PLAIN, Key::G), true), []);
+        assert_eq!(ask((ctrl, Key::Z), true), []);
+        assert_eq!(ask((ctrl, Key::S), true), [Action::Save]);
     }
 }

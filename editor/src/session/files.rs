@@ -100,7 +100,13 @@ pub(super) fn import(document: &mut Document, loaded: Loaded) -> anyhow::Result<
         Loaded::Model(imported) => {
             let name = imported.prefab.name.clone();
             let (prefab, add) = document.import_edit(*imported);
-            let (node, place) = document.instantiate_edit(prefab, None, Local::default());
+            let (node, mut place) = document.instantiate_edit(prefab, None, Local::default());
+            // The prefab is not in the document yet, so that its name is not known there.
+            if let Edit::AddNode { subtree, .. } = &mut place
+                && let Some((_, top)) = subtree.nodes.first_mut()
+            {
+                top.name.clone_from(&name);
+            }
             Ok(Brought { edit: Edit::batch(format!("imported {name}"), vec![add, place]), node: Some(node) })
         }
         Loaded::Environment(path, map) => {

@@ -118,7 +118,9 @@ impl Config {
     }
 
     fn parse(text: &str) -> serde_json::Result<Self> {
-        let mut config: Self = serde_json::from_str(text)?;
+        let mut value = serde_json::from_str(text)?;
+        mend_places(&mut value);
+        let mut config: Self = serde_json::from_value(value)?;
         // A layout without a view is of no use.
         config.layout = config.layout.filter(|dock| dock.iter_all_tabs().any(|(_, tab)| *tab == Tab::View));
         config.window = config.window.map(|side| if side.is_finite() { side.clamp(480.0, 16_384.0) } else { 960.0 });
@@ -149,6 +151,22 @@ impl Config {
     }
 }
 
+/// Panels that were never drawn are at infinity, which JSON writes as null: their places are put to zero.
+fn mend_places(value: &mut serde_json::Value) {
+    match value {
+        serde_json::Value::Object(map) => {
+            for (key, value) in map {
+                if value.is_null() && matches!(key.as_str(), "x" | "y") {
+                    *value = 0.0.into();
+                }
+                mend_places(value);
+            }
+        }
+        serde_json::Value::Array(items) => items.iter_mut().for_each(mend_places),
+        _ => {}
+    }
+}
+
 fn path() -> Option<PathBuf> {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let folder = set("XDG_CONFIG_HOME").or_else(|| set("HOME").map(|home| home.join(".config")))?;
@@ -175,7 +193,8 @@ mod tests {
 
     #[test]
     fn nonsense_is_an_error_and_odd_values_are_mended() {
-        assert!(Config::parse("[]").is_err());
+        assert!(Config::parse("{").is_err());
+        assert!(Config::parse(r#"{"dark": "perhaps"}"#).is_err());
         let odd = Config::parse(r#"{"window": [1e9, -5.0], "unknown": 1}"#).unwrap();
         assert_eq!(odd.window, [16_384.0, 480.0]);
     }

@@ -23,6 +23,7 @@ mod sampler;
 mod sbt;
 mod staging;
 mod swapchain;
+mod texture_set;
 mod timers;
 
 pub use accel::{
@@ -48,6 +49,7 @@ pub use pipeline::{
 pub use recorder::{Draw, Recorder, Use};
 pub use sampler::{Filter, Sampler, SamplerDesc, WrapMode};
 pub use swapchain::{Acquired, Swapchain};
+pub use texture_set::{TextureSet, UploadQueue};
 pub use timers::PassTime;
 
 /// Result of this package.

@@ -15,7 +15,7 @@ mod euler;
 mod rows;
 
 pub use config::{Config, Tab, default_layout};
-pub use euler::{EulerFields, degrees_from_rotation, rotation_from_degrees};
+pub use euler::EulerFields;
 pub use rows::{OutlinerState, Row};
 
 /// What is selected. The active target is the one the inspector shows.

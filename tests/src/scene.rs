@@ -23,6 +23,11 @@ impl Scene {
         Self { delta: SceneDelta { reason: String::from("test scene"), ..SceneDelta::default() }, next: 0 }
     }
 
+    /// An empty scene whose ids start past `first`, to be added to another.
+    pub fn starting_at(first: u64) -> Self {
+        Self { next: first, ..Self::new() }
+    }
+
     fn number(&mut self) -> u64 {
         self.next += 1;
         self.next

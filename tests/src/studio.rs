@@ -12,8 +12,8 @@ pub struct Studio {
     pub renderer: Renderer,
     /// Its view.
     pub view: ViewId,
-    // Dropped last: it looks whether the layer has said anything.
-    session: Session,
+    /// The session. Dropped last: it looks whether the layer has said anything.
+    pub session: Session,
 }
 
 impl Studio {
@@ -46,11 +46,6 @@ impl Studio {
         studio.view_mut().set_camera(camera);
         studio.apply(scene);
         studio
-    }
-
-    /// The session, for work beside the renderer's.
-    pub fn session(&mut self) -> &mut Session {
-        &mut self.session
     }
 
     /// The view.

@@ -56,10 +56,9 @@ fn a_plane_under_a_point_light_follows_the_formula() {
             let to_light = DVec3::new(f64::from(0.3_f32), f64::from(0.2_f32), 1.5) - point;
             let expected = 0.5 / PI * 3.0 * to_light.normalize().z / to_light.length_squared();
             let relative = (red(&image, x, y) / expected - 1.0).abs();
-            // 16-bit octahedral normals are off by at most 6.5e-5 rad.
-            if relative > 2e-5 { eprintln!("{} {x} {y} {relative:e}", pipeline.name()); }
-assert!(
-                relative < 2e-1,
+            // The base colour is a half float, which some devices cut instead of rounding: 1/2048.
+            assert!(
+                relative < 6e-4,
                 "{} at {x}, {y}: {} instead of {expected}",
                 pipeline.name(),
                 red(&image, x, y)

@@ -252,6 +252,18 @@ fn help() -> Vec<Command> {
     ]
 }
 
+/// Text that was typed after the key that opened the command palette, in the same frame: a slow frame loses nothing.
+pub fn typed_after_palette_key(context: &egui::Context) -> String {
+    let opens = |event: &egui::Event| {
+        matches!(event, egui::Event::Key { key: Key::P, pressed: true, modifiers, .. } if modifiers.command)
+            || matches!(event, egui::Event::Key { key: Key::F3, pressed: true, .. })
+    };
+    context.input(|input| {
+        let after = input.events.iter().skip_while(|event| !opens(event)).skip(1);
+        after.filter_map(|event| if let egui::Event::Text(text) = event { Some(text.as_str()) } else { None }).collect()
+    })
+}
+
 /// Second keys of some commands.
 fn aliases() -> [(Modifiers, Key, Action); 5] {
     [

@@ -12,7 +12,7 @@ use crate::dialogs::Dialogs;
 use crate::panels::{self, Cx, bars, overlays};
 use crate::session::Session;
 use crate::theme;
-use crate::ui_state::{Config, Tab, UiState, default_layout};
+use crate::ui_state::{Config, PaletteState, Tab, UiState, default_layout};
 use crate::worker::Wake;
 
 /// What waits for an answer about unsaved changes.
@@ -141,7 +141,14 @@ impl Editor {
             || self.dialogs.is_open();
         if !busy {
             let typing = context.text_edit_focused();
-            self.state.actions.extend(actions::pressed(context, typing));
+            let pressed = actions::pressed(context, typing);
+            if pressed.contains(&Action::Palette) {
+                // What follows that key is the command's name and no key of its own.
+                let text = actions::typed_after_palette_key(context);
+                self.state.palette = Some(PaletteState { text, ..PaletteState::default() });
+                return;
+            }
+            self.state.actions.extend(pressed);
         }
     }
 

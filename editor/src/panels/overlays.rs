@@ -87,6 +87,8 @@ pub fn palette(state: &mut UiState, context: &Context) {
         (_, true) => palette.chosen.saturating_sub(1),
         _ => palette.chosen.min(last),
     };
+    // Enter on an untouched palette does nothing: it would do the first command of the list.
+    let enter = enter && (!palette.text.trim().is_empty() || palette.chosen > 0);
     let mut done = enter.then(|| hits.get(palette.chosen).map(|hit| hit.action.clone())).flatten();
     let mut open = !escape && !enter;
     let at = context.content_rect().center_top() + egui::vec2(0.0, 72.0);

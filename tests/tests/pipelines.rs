@@ -1,0 +1,195 @@
+//! Pictures that must be equal: raster and ray primaries, special and general variants, the same command twice,
+//! a scene with and without what cannot be seen.
+#![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
+
+use caustica_renderer::delta::{Instance, InstanceId, SceneDelta};
+use caustica_renderer::{Accumulated, NeedsMode, Pipeline, ViewSettings};
+use caustica_tests::scene::{Scene, camera_parallel, lambert, point_light, quad, sphere, zoo};
+use caustica_tests::studio::Studio;
+use glam::{Affine3A, Vec3};
+
+const EXTENT: [u32; 2] = [96, 64];
+
+fn settings(pipeline: Pipeline) -> ViewSettings {
+    ViewSettings { pipeline, ..ViewSettings::default() }
+}
+
+fn zoo_image(settings: ViewSettings, samples: u32) -> Accumulated {
+    let (scene, camera) = zoo();
+    Studio::of(EXTENT, settings, &scene.delta, camera).mean(samples)
+}
+
+fn bits(image: &Accumulated) -> Vec<[u32; 3]> {
+    image.mean.iter().map(|pixel| pixel.map(f32::to_bits)).collect()
+}
+
+/// Pixels of which a channel differs by more than a share of its value.
+fn differing(a: &Accumulated, b: &Accumulated, share: f32) -> usize {
+    let far = |p: &[f32; 3], q: &[f32; 3]| {
+        p.iter().zip(q).any(|(x, y)| (x - y).abs() > share * (x.abs() + y.abs() + 0.01))
+    };
+    a.mean.iter().zip(&b.mean).filter(|(p, q)| far(p, q)).count()
+}
+
+#[test]
+fn raster_and_ray_primaries_see_the_same() {
+    let still = |pipeline| ViewSettings { jitter: false, ..settings(pipeline) };
+    let hybrid = zoo_image(still(Pipeline::Hybrid), 4);
+    let raytraced = zoo_image(still(Pipeline::Raytraced), 4);
+    // A pixel whose centre lies on an edge may fall to either side; masked edges have many such.
+    let count = differing(&hybrid, &raytraced, 1e-3);
+    assert!(count <= 12, "{count} pixels differ");
+}
+
+#[test]
+fn what_the_scene_does_not_need_changes_nothing() {
+    for pipeline in Pipeline::ALL {
+        // The zoo needs nearly all; a bare scene needs nearly nothing.
+        let auto = zoo_image(settings(pipeline), 2);
+        let all = zoo_image(ViewSettings { needs: NeedsMode::All, ..settings(pipeline) }, 2);
+        assert_eq!(differing(&auto, &all, 1e-6), 0, "zoo, {}", pipeline.name());
+
+        let mut scene = Scene::new();
+        scene.put(quad(8.0, 8.0), lambert(0.5), Affine3A::IDENTITY);
+        scene.put(sphere(0.5, 32), lambert(0.9), Affine3A::from_translation(Vec3::new(0.2, 0.1, 0.3)));
+        scene.light(point_light(Vec3::new(1.0, 1.2, 3.0), 5.0));
+        let bare = |needs| {
+            let settings = ViewSettings { needs, ..settings(pipeline) };
+            let mut studio = Studio::of(EXTENT, settings, &scene.delta, camera_parallel(2.0, 1.0));
+            (studio.mean(2), studio.statistics().left_out)
+        };
+        let (auto, left_out) = bare(NeedsMode::Auto);
+        let (all, nothing) = bare(NeedsMode::All);
+        assert!(left_out.len() >= 6, "{left_out:?}");
+        // A raster view casts no rays, whatever it is told.
+        assert!(nothing.is_empty() || pipeline == Pipeline::Raster, "{nothing:?}");
+        assert_eq!(differing(&auto, &all, 1e-6), 0, "bare scene, {}", pipeline.name());
+    }
+}
+
+#[test]
+fn the_same_command_gives_the_same_bits() {
+    for pipeline in Pipeline::ALL {
+        let first = zoo_image(settings(pipeline), 5);
+        let second = zoo_image(settings(pipeline), 5);
+        assert_eq!(bits(&first), bits(&second), "{}", pipeline.name());
+        let other_seed = zoo_image(ViewSettings { seed: 1, ..settings(pipeline) }, 5);
+        assert_ne!(bits(&first), bits(&other_seed), "{}", pipeline.name());
+    }
+}
+
+#[test]
+fn parts_of_a_sample_set_add_up_to_the_whole() {
+    let (scene, camera) = zoo();
+    let mut studio = Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, camera);
+    let whole = studio.mean(12);
+    let mut sum = vec![[0.0_f64; 3]; whole.mean.len()];
+    for offset in [0, 6] {
+        studio.view_mut().set_sample_offset(offset);
+        let part = studio.mean(6);
+        for (total, pixel) in sum.iter_mut().zip(&part.mean) {
+            for (t, p) in total.iter_mut().zip(pixel) {
+                *t += 0.5 * f64::from(*p);
+            }
+        }
+    }
+    for (pixel, total) in whole.mean.iter().zip(&sum) {
+        for (p, t) in pixel.iter().zip(total) {
+            assert!((f64::from(*p) - t).abs() <= 1e-5 * t.abs() + 1e-7, "{p} {t}");
+        }
+    }
+}
+
+/// The zoo with one more instance in front of everything, as `change` leaves it.
+fn zoo_with(pipeline: Pipeline, change: impl FnOnce(&mut Instance)) -> Accumulated {
+    let (mut scene, camera) = zoo();
+    let id = scene.put(sphere(0.6, 24), lambert(0.5), Affine3A::from_translation(Vec3::new(0.2, 1.0, 2.0)));
+    let entry = scene.delta.instances.iter_mut().find(|(other, _)| *other == id).expect("the new instance");
+    change(&mut entry.1);
+    Studio::of(EXTENT, settings(pipeline), &scene.delta, camera).mean(3)
+}
+
+#[test]
+fn a_hidden_instance_is_not_there() {
+    for pipeline in Pipeline::ALL {
+        let without = zoo_image(settings(pipeline), 3);
+        let hidden = zoo_with(pipeline, |instance| instance.visible = false);
+        assert_eq!(differing(&without, &hidden, 1e-6), 0, "{}", pipeline.name());
+        let shown = zoo_with(pipeline, |_| {});
+        assert!(differing(&without, &shown, 1e-2) > 300, "{}", pipeline.name());
+    }
+}
+
+#[test]
+fn a_degenerate_instance_loses_itself_only() {
+    let nan = Affine3A::from_translation(Vec3::new(f32::NAN, 0.0, 0.0));
+    let infinite = Affine3A::from_scale(Vec3::new(1.0, f32::INFINITY, 1.0));
+    let huge = Affine3A::from_scale(Vec3::splat(f32::MAX));
+    let cases = [
+        ("nothing", Affine3A::from_scale(Vec3::ZERO)),
+        ("not a number", nan),
+        ("infinite", infinite),
+        ("the largest float", huge),
+    ];
+    for pipeline in Pipeline::ALL {
+        let without = zoo_image(settings(pipeline), 3);
+        for (name, transform) in cases {
+            let with = zoo_with(pipeline, |instance| instance.render_from_mesh = transform);
+            if name == "the largest float" {
+                // Whatever is seen of it, nothing else is lost, and nothing is not finite.
+                assert!(with.mean.iter().flatten().all(|x| x.is_finite()), "{name}, {}", pipeline.name());
+            } else {
+                assert_eq!(differing(&without, &with, 1e-6), 0, "{name}, {}", pipeline.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flattened_instance_is_drawn_or_left_out_but_harms_nothing() {
+    for pipeline in Pipeline::ALL {
+        let flat = Affine3A::from_translation(Vec3::new(0.2, 1.0, 2.0))
+            * Affine3A::from_scale(Vec3::new(1.0, 1.0, 0.0));
+        let image = zoo_with(pipeline, |instance| instance.render_from_mesh = flat);
+        assert!(image.mean.iter().flatten().all(|x| x.is_finite()), "{}", pipeline.name());
+        let without = zoo_image(settings(pipeline), 3);
+        // Far from it the picture is the same but for its shadow and light.
+        let lower_left = |image: &Accumulated| image.mean[60 * EXTENT[0] as usize + 3];
+        assert_eq!(lower_left(&image), lower_left(&without));
+    }
+}
+
+#[test]
+fn an_empty_scene_is_its_environment() {
+    for pipeline in Pipeline::ALL {
+        let mut scene = Scene::new();
+        scene.surround(0.25);
+        let mut studio = Studio::of(EXTENT, settings(pipeline), &scene.delta, camera_parallel(1.0, 1.0));
+        let image = studio.mean(2);
+        assert!(image.mean.iter().flatten().all(|x| *x == 0.25), "{}", pipeline.name());
+        let nothing = SceneDelta::default();
+        studio.frame(&nothing);
+        assert_eq!(studio.statistics().samples, 3);
+    }
+}
+
+#[test]
+fn picking_finds_what_is_under_the_pixel() {
+    for pipeline in Pipeline::ALL {
+        let mut scene = Scene::new();
+        let left =
+            scene.put(quad(1.0, 1.0), lambert(0.5), Affine3A::from_translation(Vec3::new(-0.7, 0.0, 0.0)));
+        let right =
+            scene.put(quad(1.0, 1.0), lambert(0.5), Affine3A::from_translation(Vec3::new(0.7, 0.0, 0.0)));
+        let mut studio = Studio::of(EXTENT, settings(pipeline), &scene.delta, camera_parallel(1.0, 1.0));
+        studio.frames(1);
+        let mut pick = |x: u32, y: u32| -> Option<InstanceId> {
+            let (renderer, view) = (&mut studio.renderer, studio.view);
+            renderer.pick(&mut studio.session.frames, view, [x, y]).expect("a pick").map(|hit| hit.instance)
+        };
+        assert_eq!(pick(24, 32), Some(left), "{}", pipeline.name());
+        assert_eq!(pick(72, 32), Some(right), "{}", pipeline.name());
+        assert_eq!(pick(48, 32), None, "{}", pipeline.name());
+        assert_eq!(pick(1000, 32), None, "{}", pipeline.name());
+    }
+}

@@ -31,6 +31,8 @@ pub struct AppOptions {
     pub shaders: Option<PathBuf>,
     /// Load the validation layer.
     pub validation: bool,
+    /// Refuse to use more device memory than this.
+    pub memory_limit_bytes: Option<u64>,
 }
 
 /// Opens the window and runs until it is closed.

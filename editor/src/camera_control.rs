@@ -217,7 +217,10 @@ mod tests {
                 pick(4, bounds.0.z, bounds.1.z),
             );
             let point = view.project(world);
-            assert!(point.is_some_and(|p| p.cmpge(glam::DVec2::ZERO).all() && p.cmple(size).all()), "{point:?}");
+            assert!(
+                point.is_some_and(|p| p.cmpge(glam::DVec2::ZERO).all() && p.cmple(size).all()),
+                "{point:?}"
+            );
         }
     }
 
@@ -235,7 +238,10 @@ mod tests {
             let pose = Pose::along_axis(axis, pivot, 7.0);
             assert!((pose.pivot(7.0) - pivot).length() < 1e-12, "{axis:?}");
             assert!((pose.rotation.length() - 1.0).abs() < 1e-12);
-            assert!((pose.right().cross(pose.up()) + pose.forward()).length() < 1e-12, "{axis:?} is right-handed");
+            assert!(
+                (pose.right().cross(pose.up()) + pose.forward()).length() < 1e-12,
+                "{axis:?} is right-handed"
+            );
         }
     }
 

@@ -5,6 +5,7 @@ mod devices;
 mod output;
 mod render;
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -15,7 +16,7 @@ use clap::{Args, Parser, Subcommand};
 
 /// Scene editor with a hybrid Vulkan ray-tracing renderer. Without a subcommand the editor opens.
 #[derive(Parser, Debug)]
-#[command(name = "caustica", version, about, args_conflicts_with_subcommands = true)]
+#[command(name = "caustica", version, about, subcommand_negates_reqs = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -24,7 +25,7 @@ struct Cli {
     #[command(flatten)]
     device: DeviceArgs,
     /// Read shaders from this folder instead of the copy in the binary
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", global = true)]
     shaders: Option<PathBuf>,
 }
 
@@ -57,8 +58,11 @@ impl DeviceArgs {
     fn open(&self) -> Result<Arc<Device>, GpuError> {
         let instance = Instance::new(InstanceOptions { validation: self.validation, display: None })?;
         let requirements = Requirements { device: self.device.clone(), present: false };
-        let memory_limit_bytes = self.memory_budget.map(|mib| mib.saturating_mul(1 << 20));
-        Device::new(&instance, &DeviceOptions { requirements, memory_limit_bytes })
+        Device::new(&instance, &DeviceOptions { requirements, memory_limit_bytes: self.memory_limit_bytes() })
+    }
+
+    fn memory_limit_bytes(&self) -> Option<u64> {
+        self.memory_budget.map(|mib| mib.saturating_mul(1 << 20))
     }
 }
 
@@ -84,10 +88,11 @@ pub fn run() -> ExitCode {
         Some(Command::Check(args)) => logged(|| check::run(&args)),
         Some(Command::Devices(args)) => logged(|| devices::run(&args)),
         None => crate::app::run(crate::app::AppOptions {
-            file: cli.file,
-            device: cli.device.device,
+            file: cli.file.or_else(demo_project),
+            device: cli.device.device.clone(),
             shaders: cli.shaders,
             validation: cli.device.validation,
+            memory_limit_bytes: cli.device.memory_limit_bytes(),
         })
         .map(|()| ExitCode::SUCCESS),
     };
@@ -97,6 +102,13 @@ pub fn run() -> ExitCode {
     })
 }
 
+/// The demo project, where the program is started from its checkout or was built in one that is still there.
+fn demo_project() -> Option<PathBuf> {
+    const DEMO: &str = "projects/gallery/gallery.caustica.json";
+    let folders = [PathBuf::from("."), PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))];
+    folders.into_iter().map(|folder| folder.join(DEMO)).find(|file| file.is_file())
+}
+
 /// Runs a subcommand with warnings printed to standard error.
 fn logged(run: impl FnOnce() -> anyhow::Result<ExitCode>) -> anyhow::Result<ExitCode> {
     let filter = tracing_subscriber::EnvFilter::try_from_env("CAUSTICA_LOG")
@@ -104,6 +116,7 @@ fn logged(run: impl FnOnce() -> anyhow::Result<ExitCode>) -> anyhow::Result<Exit
     let subscriber = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
         .without_time()
         .finish();
     tracing::subscriber::with_default(subscriber, run)

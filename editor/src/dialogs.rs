@@ -52,8 +52,17 @@ impl Wish {
 }
 
 enum Shown {
-    Portal { wish: Wish, since: Instant, job: Job<Option<PathBuf>>, folder: Option<PathBuf>, file_name: String },
-    Own { wish: Wish, dialog: Box<FileDialog> },
+    Portal {
+        wish: Wish,
+        since: Instant,
+        job: Job<Option<PathBuf>>,
+        folder: Option<PathBuf>,
+        file_name: String,
+    },
+    Own {
+        wish: Wish,
+        dialog: Box<FileDialog>,
+    },
 }
 
 /// The one file dialog that may be open.
@@ -87,7 +96,8 @@ impl Dialogs {
                 return;
             }
         }
-        self.shown = Some(Shown::Own { wish, dialog: Box::new(own_dialog(wish, folder.as_deref(), file_name)) });
+        self.shown =
+            Some(Shown::Own { wish, dialog: Box::new(own_dialog(wish, folder.as_deref(), file_name)) });
     }
 
     /// Draws the own dialog and asks the portal; gives the chosen path once.

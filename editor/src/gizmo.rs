@@ -127,7 +127,8 @@ pub fn hit(tool: Tool, frame: &Frame, view: &ViewProjection, pointer: DVec2) -> 
             if pointer.distance(center) < GRAB_POINTS {
                 return Some(Handle::Center);
             }
-            let plane = (0..3).find(|&axis| plane_is_usable(frame, view, axis) && in_plane(frame, view, axis, pointer));
+            let plane = (0..3)
+                .find(|&axis| plane_is_usable(frame, view, axis) && in_plane(frame, view, axis, pointer));
             if tool == Tool::Move && plane.is_some() {
                 return plane.map(Handle::Plane);
             }
@@ -340,14 +341,19 @@ impl Start {
         }
         let position = self.world_from_parent.transform_point3(self.local.translation());
         let moved = match motion {
-            Motion::Translate(by) => with_translation(self.local, parent_from_world.transform_point3(position + by)),
+            Motion::Translate(by) => {
+                with_translation(self.local, parent_from_world.transform_point3(position + by))
+            }
             Motion::Rotate { axis, angle_rad } => {
                 let turn = DQuat::from_axis_angle(axis, angle_rad);
                 let place = parent_from_world.transform_point3(pivot + turn * (position - pivot));
                 // A mirrored parent turns the other way round.
                 let sign = self.world_from_parent.matrix3.determinant().signum();
                 let axis = parent_from_world.transform_vector3(axis).try_normalize()?;
-                with_rotation(with_translation(self.local, place), DQuat::from_axis_angle(axis, angle_rad * sign))
+                with_rotation(
+                    with_translation(self.local, place),
+                    DQuat::from_axis_angle(axis, angle_rad * sign),
+                )
             }
             Motion::Scale(factors) => with_scale(self.local, factors),
         };

@@ -15,7 +15,8 @@ use tracing_subscriber::{EnvFilter, Layer};
 /// Most lines kept.
 const MOST_LINES: usize = 2000;
 /// What is logged when RUST_LOG says nothing.
-const DEFAULT_FILTER: &str = "warn,caustica=info,caustica_scene=info,caustica_renderer=info,caustica_gpu=info";
+const DEFAULT_FILTER: &str =
+    "warn,winit=error,caustica=info,caustica_scene=info,caustica_renderer=info,caustica_gpu=info";
 
 /// One line of the log.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +47,8 @@ impl Default for LogBuffer {
 impl LogBuffer {
     /// Adds a line.
     pub fn push(&self, level: Level, target: &str, text: String) {
-        let line = LogLine { seconds: self.start.elapsed().as_secs_f64(), level, target: target.to_owned(), text };
+        let line =
+            LogLine { seconds: self.start.elapsed().as_secs_f64(), level, target: target.to_owned(), text };
         if let Ok(mut lines) = self.lines.lock() {
             if lines.len() == MOST_LINES {
                 lines.pop_front();
@@ -119,7 +121,11 @@ pub fn install() -> LogBuffer {
         .with(LogLayer::new(buffer.clone()))
         .try_init();
     if installed.is_err() {
-        buffer.push(Level::WARN, "caustica", "another log subscriber is active: the log is not shown here".to_owned());
+        buffer.push(
+            Level::WARN,
+            "caustica",
+            "another log subscriber is active: the log is not shown here".to_owned(),
+        );
     }
     buffer
 }
@@ -140,7 +146,11 @@ mod tests {
         buffer.read(|lines| {
             assert_eq!(lines.len(), MOST_LINES);
             assert_eq!(lines[0].level, Level::WARN);
-            assert!(lines[0].text.contains("imported chair.glb") && lines[0].text.contains("count=5"), "{:?}", lines[0]);
+            assert!(
+                lines[0].text.contains("imported chair.glb") && lines[0].text.contains("count=5"),
+                "{:?}",
+                lines[0]
+            );
         });
         buffer.clear();
         buffer.read(|lines| assert!(lines.is_empty()));

@@ -71,11 +71,14 @@ pub fn light_icon(kind: &LightKind) -> &'static str {
 
 /// A section of a panel that can be closed.
 pub fn section(ui: &mut Ui, title: &str, body: impl FnOnce(&mut Ui)) {
-    egui::CollapsingHeader::new(RichText::new(title).strong()).id_salt(title).default_open(true).show_unindented(ui, |ui| {
-        ui.add_space(2.0);
-        body(ui);
-        ui.add_space(6.0);
-    });
+    egui::CollapsingHeader::new(RichText::new(title).strong())
+        .id_salt(title)
+        .default_open(true)
+        .show_unindented(ui, |ui| {
+            ui.add_space(2.0);
+            body(ui);
+            ui.add_space(6.0);
+        });
 }
 
 /// A line of a form: a name of fixed width, then what is edited.

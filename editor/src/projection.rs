@@ -19,7 +19,8 @@ impl Ray {
     pub fn meet_plane(&self, point: DVec3, normal: DVec3) -> Option<DVec3> {
         let slope = normal.dot(self.direction);
         let distance = normal.dot(point - self.origin) / slope;
-        (slope.abs() > 1e-9 && distance.is_finite() && distance >= 0.0).then(|| self.origin + self.direction * distance)
+        (slope.abs() > 1e-9 && distance.is_finite() && distance >= 0.0)
+            .then(|| self.origin + self.direction * distance)
     }
 
     /// How far along the line through `point` in the unit `direction` the place nearest to this ray's line lies;
@@ -52,10 +53,17 @@ impl ViewProjection {
     /// `world_from_camera` is rigid and looks along -Z with +Y up; `size` is in points.
     pub fn new(world_from_camera: DAffine3, projection: Projection, size: DVec2) -> Self {
         let lens = match projection {
-            Projection::Perspective { yfov_rad } => Lens::Perspective { tan_half_y: (f64::from(yfov_rad) * 0.5).tan() },
+            Projection::Perspective { yfov_rad } => {
+                Lens::Perspective { tan_half_y: (f64::from(yfov_rad) * 0.5).tan() }
+            }
             Projection::Orthographic { ymag_m } => Lens::Orthographic { half_height_m: f64::from(ymag_m) },
         };
-        Self { world_from_camera, camera_from_world: world_from_camera.inverse(), lens, size: size.max(DVec2::ONE) }
+        Self {
+            world_from_camera,
+            camera_from_world: world_from_camera.inverse(),
+            lens,
+            size: size.max(DVec2::ONE),
+        }
     }
 
     /// Where the camera stands, metres.
@@ -108,7 +116,11 @@ impl ViewProjection {
                     .normalize_or(self.forward()),
             },
             Lens::Orthographic { half_height_m } => Ray {
-                origin: self.world_from_camera.transform_point3(DVec3::new(x * half_height_m, y * half_height_m, 0.0)),
+                origin: self.world_from_camera.transform_point3(DVec3::new(
+                    x * half_height_m,
+                    y * half_height_m,
+                    0.0,
+                )),
                 direction: self.forward(),
             },
         }
@@ -145,7 +157,9 @@ mod tests {
 
     #[test]
     fn a_ray_through_a_projected_place_meets_it() {
-        for projection in [Projection::Perspective { yfov_rad: 0.8 }, Projection::Orthographic { ymag_m: 4.0 }] {
+        for projection in
+            [Projection::Perspective { yfov_rad: 0.8 }, Projection::Orthographic { ymag_m: 4.0 }]
+        {
             let view = view(projection);
             for offset in [DVec2::new(0.0, 0.0), DVec2::new(250.0, -120.0), DVec2::new(-390.0, 290.0)] {
                 let point = DVec2::new(400.0, 300.0) + offset;

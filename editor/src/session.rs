@@ -22,6 +22,9 @@ use crate::sync::{Sync, camera_of};
 /// A still view stops asking for frames at this many samples.
 const CONVERGED_SAMPLES: u64 = 4096;
 
+/// Device time of one submit while the window is open: input is answered in between.
+const SUBMIT_BUDGET_MS: f64 = 30.0;
+
 /// How to make a session.
 #[derive(Clone, Debug, Default)]
 pub struct SessionOptions {
@@ -72,6 +75,9 @@ impl Session {
         let renderer_options = RendererOptions { shaders: options.shaders };
         let mut renderer = Renderer::new(device, &mut frames, &renderer_options)?;
         let view = renderer.create_view(options.extent, options.settings, options.window)?;
+        if options.window {
+            renderer.view_mut(view)?.set_submit_budget(Some(SUBMIT_BUDGET_MS));
+        }
         Ok(Self {
             document: Document::new(),
             history: History::new(),
@@ -316,7 +322,9 @@ impl Session {
     /// # Errors
     /// When the device is lost.
     pub fn begin_ui_frame(&mut self) -> anyhow::Result<Recorder> {
-        Ok(self.frames.begin()?)
+        let recorder = self.frames.begin()?;
+        self.renderer.note_times(self.view, &self.frames)?;
+        Ok(recorder)
     }
 
     /// Submits a frame.

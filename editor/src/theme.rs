@@ -2,8 +2,8 @@
 //! Enters: which of the two. Leaves: egui styles. It knows no panel.
 
 use egui::{
-    Color32, Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle,
-    Theme, Vec2, Visuals,
+    Color32, Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Shadow, Stroke,
+    Style, TextStyle, Theme, Vec2, Visuals,
 };
 
 /// Half a step of the grid, points.
@@ -51,12 +51,12 @@ const DARK: Palette = Palette {
 
 const LIGHT: Palette = Palette {
     sunken: Color32::from_rgb(255, 255, 255),
-    window: Color32::from_rgb(226, 229, 234),
-    panel: Color32::from_rgb(242, 244, 247),
-    raised: Color32::from_rgb(222, 226, 232),
-    hovered: Color32::from_rgb(208, 214, 223),
-    pressed: Color32::from_rgb(192, 200, 212),
-    line: Color32::from_rgb(204, 209, 217),
+    window: Color32::from_rgb(212, 217, 225),
+    panel: Color32::from_rgb(237, 240, 244),
+    raised: Color32::from_rgb(251, 252, 254),
+    hovered: Color32::from_rgb(222, 229, 238),
+    pressed: Color32::from_rgb(200, 209, 221),
+    line: Color32::from_rgb(198, 204, 213),
     text: Color32::from_rgb(46, 52, 62),
     weak: Color32::from_rgb(104, 112, 125),
     strong: Color32::from_rgb(14, 18, 24),
@@ -200,8 +200,10 @@ fn visuals(theme: Theme, colors: &Palette) -> Visuals {
     visuals.selection.stroke = Stroke::new(1.0, colors.strong);
     visuals.slider_trailing_fill = true;
     visuals.indent_has_left_vline = false;
-    visuals.window_shadow = Shadow { offset: [0, 8], blur: 24, spread: 0, color: Color32::from_black_alpha(96) };
-    visuals.popup_shadow = Shadow { offset: [0, 4], blur: 12, spread: 0, color: Color32::from_black_alpha(80) };
+    visuals.window_shadow =
+        Shadow { offset: [0, 8], blur: 24, spread: 0, color: Color32::from_black_alpha(96) };
+    visuals.popup_shadow =
+        Shadow { offset: [0, 4], blur: 12, spread: 0, color: Color32::from_black_alpha(80) };
     let widgets = &mut visuals.widgets;
     let states = [
         (&mut widgets.noninteractive, colors.panel, colors.text, colors.line),

@@ -4,10 +4,12 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use caustica_renderer::gpu::{Device, Frames, Image, Recorder, ResourceId, Swapchain, TextureSet, UploadQueue, ash::vk};
+use caustica_renderer::gpu::{
+    Device, Frames, Image, Recorder, ResourceId, Swapchain, TextureSet, UploadQueue, ash::vk,
+};
+use egui::TextureId;
 use egui::epaint::textures::TexturesDelta;
 use egui::epaint::{ClippedPrimitive, Primitive};
-use egui::TextureId;
 use egui_ash_renderer::allocator::GpuAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
 
@@ -47,7 +49,13 @@ impl UiRenderer {
         let renderer = Renderer::with_gpu_allocator(device.allocator(), device.raw().clone(), mode, options)
             .context("making the user-interface renderer")?;
         let upload = UploadQueue::new(device)?;
-        Ok(Self { renderer: Some(renderer), upload, view: None, freed: Vec::new(), device: Arc::clone(device) })
+        Ok(Self {
+            renderer: Some(renderer),
+            upload,
+            view: None,
+            freed: Vec::new(),
+            device: Arc::clone(device),
+        })
     }
 
     /// Takes in new and changed textures, the font atlas among them. Waits for the queue when there are any.

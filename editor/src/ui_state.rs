@@ -92,7 +92,8 @@ impl Selection {
     /// The selected targets that hang below no other selected one: what a move has to touch.
     pub fn tops(&self, document: &Document) -> Vec<Target> {
         let below_another = |target: Target| {
-            std::iter::successors(document.parent_of(target), |&t| document.parent_of(t)).any(|t| self.targets.contains(&t))
+            std::iter::successors(document.parent_of(target), |&t| document.parent_of(t))
+                .any(|t| self.targets.contains(&t))
         };
         self.targets.iter().copied().filter(|&target| !below_another(target)).collect()
     }
@@ -193,8 +194,6 @@ pub struct ViewState {
     pub fly_speed_m_s: f64,
     /// A mouse button moves the camera now.
     pub navigating: bool,
-    /// Milliseconds from one finished picture to the next, smoothed.
-    pub frame_ms: f64,
 }
 
 impl Default for ViewState {
@@ -209,7 +208,6 @@ impl Default for ViewState {
             flying: false,
             fly_speed_m_s: 2.0,
             navigating: false,
-            frame_ms: 0.0,
         }
     }
 }

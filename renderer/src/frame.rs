@@ -27,7 +27,12 @@ pub(crate) fn record(
 ) -> Result<()> {
     view.prepare_targets(needs)?;
     let what = view.accumulation.take_pending();
+    if what != Invalidation::Nothing {
+        view.bands.abandon();
+    }
     let plan = Plan::of(view, what, needs);
+    let band = view.bands.next(view.extent()[1], plan.moved);
+    recorder.set_tag(view.bands.tag(&band));
     let matrices = CameraMatrices::of(view.camera(), view.extent());
     let constants = frame_constants(recorder, view, tables, &matrices, &plan)?;
     let frame_address = recorder.stage_bytes(bytemuck::bytes_of(&constants))?;
@@ -37,6 +42,7 @@ pub(crate) fn record(
         set: tables.textures.set_of(recorder.slot()),
         frame_address,
         extent: view.extent(),
+        rows: band.rows.clone(),
     };
     if constants.accumulated == 0 {
         recorder.clear_buffer(&view.counters.device);
@@ -46,25 +52,45 @@ pub(crate) fn record(
         return Ok(());
     };
 
-    passes.gbuffer.record(recorder, &scope, targets, parity)?;
+    if band.first {
+        passes.gbuffer.record(recorder, &scope, targets, parity)?;
+    }
     if let Some(shadow) = &passes.shadow {
         shadow.record(recorder, &scope, targets, parity)?;
     }
+    let filled = view.history.map_or(0, |filled| 1 - filled);
     if let Some(temporal) = passes.temporal.as_ref().filter(|_| plan.moving) {
-        temporal.record(recorder, &scope, targets, parity)?;
+        temporal.record(recorder, &scope, targets, parity, filled)?;
     }
     let light = match (&targets.history, plan.moving) {
-        (Some(history), true) => Some((&history.diffuse[parity], &history.specular[parity])),
+        (Some(history), true) => Some((&history.diffuse[filled], &history.specular[filled])),
         _ => targets.direct_diffuse.as_ref().zip(targets.direct_specular.as_ref()),
     };
     passes.shading.record(recorder, &scope, targets, parity, light)?;
-    if !plan.moving {
+    if band.last && !plan.moving {
         passes.accumulate.record(recorder, &scope, targets, accumulator, &view.counters.device)?;
     }
-    passes.post.record(recorder, &scope, targets, parity, accumulator, view.settings().show)?;
+    let shown_history = if plan.moving { filled } else { view.history.unwrap_or(filled) };
+    // In the middle of a sample the display is made again only when the way it is shown has changed.
+    let display = view.display_key();
+    let mut displayed = None;
+    let has_samples = view.accumulation.samples() > 0;
+    if band.last || (has_samples && view.displayed.as_ref() != Some(&display)) {
+        passes.post.record(recorder, &scope, targets, (parity, shown_history), accumulator, view.settings().show)?;
+        displayed = Some(display);
+    }
     let counters = &view.counters;
     recorder.copy_buffer(&counters.device, &counters.host[recorder.slot() % counters.host.len()], 16)?;
 
+    if let Some(display) = displayed {
+        view.set_displayed(display);
+    }
+    if !band.last {
+        return Ok(());
+    }
+    if plan.moving && passes.temporal.is_some() {
+        view.history = Some(filled);
+    }
     if !plan.moving {
         view.accumulation.advance();
     }
@@ -75,6 +101,8 @@ pub(crate) fn record(
 
 /// What kind of frame this is.
 struct Plan {
+    /// The camera or the scene moved: the frame must be whole, or a drag would never show one.
+    moved: bool,
     /// Shown denoised, not accumulated: something moved.
     moving: bool,
     /// The past belongs to the last frame and may be reprojected.
@@ -84,8 +112,8 @@ struct Plan {
 impl Plan {
     fn of(view: &View, what: Invalidation, needs: Needs) -> Self {
         let moved = matches!(what, Invalidation::Camera | Invalidation::Scene);
-        let moving = moved && needs.temporal && view.settings().temporal && view.previous.is_some();
-        Self { moving, history: moving && what < Invalidation::Everything }
+        let moving = moved && needs.temporal && view.settings().temporal;
+        Self { moved, moving, history: moving && view.history.is_some() && view.previous.is_some() }
     }
 }
 

@@ -8,6 +8,7 @@ mod shading;
 mod shadow;
 mod temporal;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use caustica_gpu::{
@@ -96,11 +97,13 @@ pub(crate) struct Scope<'a> {
     pub(crate) set: &'a SceneSet,
     pub(crate) frame_address: u64,
     pub(crate) extent: [u32; 2],
+    /// Rows of the image that the ray passes of this frame cover.
+    pub(crate) rows: Range<u32>,
 }
 
 impl Scope<'_> {
-    fn push(&self, argument0: u32) -> Push {
-        Push { frame_address: self.frame_address, argument0, argument1: 0 }
+    fn push(&self, argument0: u32, first_row: u32) -> Push {
+        Push { frame_address: self.frame_address, argument0, argument1: first_row }
     }
 
     /// Runs a compute pass over every pixel.
@@ -118,25 +121,27 @@ impl Scope<'_> {
             all.extend(self.tables.uses(Stage::Compute));
         }
         let groups = [self.extent[0].div_ceil(8), self.extent[1].div_ceil(8), 1];
-        let push = self.push(argument0);
+        let push = self.push(argument0, 0);
         recorder.pass(label, |recorder| {
             recorder.dispatch(pipeline, Some(self.set), binds, &all, bytemuck::bytes_of(&push), groups)
         })?;
         Ok(())
     }
 
-    /// Launches one ray generation shader a pixel.
+    /// Launches one ray generation shader a pixel of `rows`.
     fn rays(
         &self,
         recorder: &mut Recorder,
         label: &str,
         pipeline: &RayTracingPipeline,
         binds: &[(&str, Bind<'_>)],
+        rows: Range<u32>,
         argument0: u32,
     ) -> Result<()> {
         let mut uses = self.tables.uses(Stage::RayTracing).to_vec();
         uses.extend(self.accel.uses());
-        let push = self.push(argument0);
+        let push = self.push(argument0, rows.start);
+        let size = [self.extent[0], rows.end - rows.start];
         recorder.pass(label, |recorder| {
             recorder.trace_rays(
                 pipeline,
@@ -144,7 +149,7 @@ impl Scope<'_> {
                 binds,
                 &uses,
                 bytemuck::bytes_of(&push),
-                self.extent,
+                size,
             )
         })?;
         Ok(())

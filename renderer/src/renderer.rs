@@ -192,13 +192,15 @@ impl Renderer {
         Ok(())
     }
 
-    /// Takes over the times of the newest frame that has finished.
+    /// Takes over the times of the newest frame that has finished; to be called once after each `Frames::begin`.
     ///
     /// # Errors
     /// When the view was removed.
     pub fn note_times(&mut self, id: ViewId, frames: &Frames) -> Result<()> {
-        let passes = &frames.finished().passes;
-        self.view_mut(id)?.statistics.passes = passes.iter().map(|p| (p.label.clone(), p.ms)).collect();
+        let view = self.view_mut(id)?;
+        if let Some(times) = view.bands.note(frames.finished()) {
+            view.statistics.passes = times;
+        }
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! A view: one camera, one choice of pipeline, its targets, its history and its frame counter.
 //! Moving a view's camera resets that view alone; an edit of the scene resets all of them.
 
+mod bands;
 mod camera;
 mod targets;
 
@@ -8,6 +9,7 @@ use std::sync::Arc;
 
 use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse};
 
+pub(crate) use bands::Bands;
 pub(crate) use camera::{CameraMatrices, jitter_px};
 pub(crate) use targets::Targets;
 
@@ -17,7 +19,7 @@ use crate::error::Result;
 use crate::gpu_types::AccumulatorPixel;
 use crate::measure::Statistics;
 use crate::needs::Needs;
-use crate::settings::ViewSettings;
+use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
 
 /// Names a view of a renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,16 +35,33 @@ pub struct View {
     pub(crate) statistics: Statistics,
     /// Instance slots that are outlined, as a bit set.
     pub(crate) selection: Vec<u32>,
-    /// Targets of the present extent and needs; made at the first frame.
-    pub(crate) targets: Option<(Needs, Targets)>,
+    /// Targets of the present extent, with what they were made for; made at the first frame.
+    pub(crate) targets: Option<((Needs, Pipeline), Targets)>,
     pub(crate) accumulator: Option<Buffer>,
     pub(crate) counters: Counters,
     /// Camera of the last frame, without jitter.
     pub(crate) previous: Option<CameraMatrices>,
+    /// Which history images the temporal pass filled last; `None`: there is no history.
+    pub(crate) history: Option<usize>,
+    /// The window's image of the last size, shown until the first sample of the new size is complete.
+    last_window: Option<Image>,
     /// Frames rendered; its parity chooses among the history images.
     pub(crate) frame_count: u64,
+    /// How still samples are cut into submits.
+    pub(crate) bands: Bands,
+    /// What the display image was made with.
+    pub(crate) displayed: Option<Displayed>,
     /// The image goes to a window: the last pass encodes it and draws the outline.
     window: bool,
+}
+
+/// What the display depends on beside the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Displayed {
+    exposure_ev: f32,
+    tone_map: ToneMap,
+    show: Show,
+    selection: Vec<u32>,
 }
 
 /// The device's counters and their copies for the host, one a frame in flight.
@@ -76,7 +95,11 @@ impl View {
             accumulator: None,
             counters: Counters { device: counter(Location::Device)?, host },
             previous: None,
+            history: None,
+            last_window: None,
             frame_count: 0,
+            bands: Bands::default(),
+            displayed: None,
             window,
         })
     }
@@ -111,6 +134,22 @@ impl View {
         self.accumulation.samples()
     }
 
+    /// Device time that one submit of a still view may take: a slower sample is cut into several. `None`: never cut,
+    /// as for headless runs.
+    pub fn set_submit_budget(&mut self, budget_ms: Option<f64>) {
+        self.bands.set_budget(budget_ms);
+    }
+
+    /// What the display would be made with now.
+    pub(crate) fn display_key(&self) -> Displayed {
+        Displayed {
+            exposure_ev: self.settings.exposure_ev,
+            tone_map: self.settings.tone_map,
+            show: self.settings.show,
+            selection: self.selection.clone(),
+        }
+    }
+
     /// Starts the sample set at `offset`. Resets the view.
     pub fn set_sample_offset(&mut self, offset: u64) {
         self.accumulation.set_offset(offset);
@@ -137,7 +176,7 @@ impl View {
         let extent = extent.map(|n| n.max(1));
         if extent != self.extent {
             self.extent = extent;
-            self.targets = None;
+            self.drop_targets();
             self.accumulator = None;
             self.accumulation.invalidate(Invalidation::Resize, "size of the view");
         }
@@ -150,16 +189,35 @@ impl View {
 
     /// The image encoded for the window; `None` before the first frame and in a view without a window.
     pub fn window_image(&self) -> Option<&Image> {
-        self.targets.as_ref().and_then(|(_, targets)| targets.window.as_ref())
+        let ready = self.displayed.as_ref().and(self.targets.as_ref());
+        ready.map_or(self.last_window.as_ref(), |(_, targets)| targets.window.as_ref())
+    }
+
+    /// Lets the targets go, and with them what they remember; the window's image stays until there is a new one.
+    fn drop_targets(&mut self) {
+        if let Some((_, targets)) = self.targets.take()
+            && self.displayed.take().is_some()
+        {
+            self.last_window = targets.window;
+        }
+        self.previous = None;
+        self.history = None;
+        self.bands.abandon();
+    }
+
+    /// Notes that the display was made.
+    pub(crate) fn set_displayed(&mut self, display: Displayed) {
+        self.displayed = Some(display);
+        self.last_window = None;
     }
 
     /// Makes targets for these needs unless they are there; the history starts anew with them.
     pub(crate) fn prepare_targets(&mut self, needs: Needs) -> Result<()> {
-        if self.targets.as_ref().is_none_or(|(made_for, _)| *made_for != needs) {
-            self.targets = None;
-            self.targets =
-                Some((needs, Targets::new(&self.device, self.extent, &needs, &self.settings, self.window)?));
-            self.previous = None;
+        let wanted = (needs, self.settings.pipeline);
+        if self.targets.as_ref().is_none_or(|(made_for, _)| *made_for != wanted) {
+            self.drop_targets();
+            let targets = Targets::new(&self.device, self.extent, &needs, &self.settings, self.window)?;
+            self.targets = Some((wanted, targets));
         }
         if self.accumulator.is_none() {
             let pixels = u64::from(self.extent[0]) * u64::from(self.extent[1]);
@@ -192,7 +250,7 @@ fn invalidation_of(old: &ViewSettings, new: &ViewSettings) -> Invalidation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::{NeedsMode, Pipeline, Show, ToneMap};
+    use crate::settings::NeedsMode;
 
     #[test]
     fn what_only_changes_the_display_keeps_the_samples() {

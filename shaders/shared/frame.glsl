@@ -86,7 +86,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer AccumulatorT
 layout(push_constant, scalar) uniform Push {
     uint64_t frame_address;             // FrameTable
     uint argument0;                     // pass-specific
-    uint argument1;
+    uint argument1;                     // first row of a ray generation shader: a sample may be cut into bands
 } push;
 
 #endif

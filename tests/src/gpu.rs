@@ -1,6 +1,7 @@
 //! One device a process, one test at a time on it. Enters: nothing. Leaves: a `Session` that, at its end, fails the
 //! test when the validation layer has said anything.
 
+use std::cell::Cell;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use caustica_gpu::{Device, DeviceOptions, Frames, Instance, InstanceOptions, Requirements};
@@ -12,6 +13,10 @@ struct Shared {
 
 static SHARED: OnceLock<Shared> = OnceLock::new();
 static TURN: Mutex<()> = Mutex::new(());
+
+thread_local! {
+    static HELD: Cell<bool> = const { Cell::new(false) };
+}
 
 /// The device, for the length of one test.
 pub struct Session {
@@ -47,8 +52,9 @@ pub fn device_options() -> DeviceOptions {
 /// Waits for its turn and gives the device to a test.
 ///
 /// # Panics
-/// Without a device that can run Caustica, or without the validation layer.
+/// Without a device that can run Caustica, without the validation layer, or when this test holds a session already.
 pub fn session() -> Session {
+    assert!(!HELD.replace(true), "this test holds the device already: drop the first session");
     let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let shared = SHARED.get_or_init(|| {
         let instance = validated_instance();
@@ -80,6 +86,7 @@ pub fn assert_silent(instance: &Instance) {
 
 impl Drop for Session {
     fn drop(&mut self) {
+        HELD.set(false);
         if let Err(error) = self.frames.finish() {
             eprintln!("the device did not finish: {error}");
         }

@@ -89,16 +89,17 @@ fn a_moved_instance_comes_to_rest_as_in_a_fresh_scene() {
 #[test]
 fn a_frame_in_motion_shows_the_moved_object() {
     for pipeline in [Pipeline::Hybrid, Pipeline::Raytraced] {
+        let mut still = studio_of(pipeline, 0.7, 0.05).0;
+        still.set(|settings| settings.tone_map = ToneMap::Linear);
+        still.frames(64);
+        let expected = still.display();
+        drop(still);
         let (mut studio, ball) = studio_of(pipeline, -0.6, 0.05);
         studio.set(|settings| settings.tone_map = ToneMap::Linear);
         studio.frames(8);
         let before = studio.display();
         studio.frame(&moved(ball, 0.7));
         let moving = studio.display();
-        let mut still = studio_of(pipeline, 0.7, 0.05).0;
-        still.set(|settings| settings.tone_map = ToneMap::Linear);
-        still.frames(64);
-        let expected = still.display();
         let distance = |a: &[[f32; 4]], b: &[[f32; 4]]| {
             a.iter().zip(b).map(|(p, q)| (p[0] - q[0]).abs()).sum::<f32>() / a.len() as f32
         };
@@ -113,6 +114,8 @@ fn a_frame_in_motion_shows_the_moved_object() {
 
 #[test]
 fn what_only_changes_the_display_keeps_the_samples() {
+    // The mean must be that of seven samples of the same set.
+    let expected = studio_of(Pipeline::Hybrid, 0.0, 0.0).0.mean(7);
     let (mut studio, _) = studio_of(Pipeline::Hybrid, 0.0, 0.0);
     studio.frames(3);
     let resets = studio.statistics().resets;
@@ -132,8 +135,6 @@ fn what_only_changes_the_display_keeps_the_samples() {
         "the last reset was: {}",
         figures.reset_reason
     );
-    // The mean is that of seven samples of the same set.
-    let expected = studio_of(Pipeline::Hybrid, 0.0, 0.0).0.mean(7);
     let after = studio.read();
     assert!(largest_difference(&after, &expected) < 1e-6);
     assert!(largest_difference(&after, &before) > 0.0);

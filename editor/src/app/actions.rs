@@ -146,7 +146,13 @@ const CTRL: Modifiers = Modifiers::COMMAND;
 const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
 const PLAIN: Modifiers = Modifiers::NONE;
 
-fn command(menu: Menu, icon: &'static str, name: &str, action: Action, key: Option<(Modifiers, Key)>) -> Command {
+fn command(
+    menu: Menu,
+    icon: &'static str,
+    name: &str,
+    action: Action,
+    key: Option<(Modifiers, Key)>,
+) -> Command {
     let shortcut = key.map(|(modifiers, key)| KeyboardShortcut::new(modifiers, key));
     Command { action, menu, name: name.to_owned(), icon, shortcut }
 }
@@ -208,13 +214,20 @@ fn view() -> Vec<Command> {
         axis("Left", AxisView::Left, CTRL, Key::Num3),
         axis("Top", AxisView::Top, PLAIN, Key::Num7),
         axis("Bottom", AxisView::Bottom, CTRL, Key::Num7),
-        view(icon::PERSPECTIVE, "Perspective or parallel", Action::ToggleProjection, Some((PLAIN, Key::Num5))),
+        view(
+            icon::PERSPECTIVE,
+            "Perspective or parallel",
+            Action::ToggleProjection,
+            Some((PLAIN, Key::Num5)),
+        ),
         view(icon::CIRCLE_HALF, "Dark or light theme", Action::ToggleTheme, None),
         view(icon::LAYOUT, "Reset the layout", Action::ResetLayout, None),
     ];
-    commands.extend(Tab::ALL.map(|tab| {
-        command(Menu::View, "", &format!("Panel: {}", tab.name()), Action::ShowTab(tab), None)
-    }));
+    commands.extend(
+        Tab::ALL.map(|tab| {
+            command(Menu::View, "", &format!("Panel: {}", tab.name()), Action::ShowTab(tab), None)
+        }),
+    );
     commands
 }
 
@@ -225,7 +238,9 @@ fn render() -> Vec<Command> {
         render(icon::GAUGE, "Lower resolution while moving", Action::ToggleAdaptive),
     ];
     commands.extend(
-        Pipeline::ALL.map(|pipeline| render("", &format!("Pipeline: {}", pipeline.name()), Action::Pipeline(pipeline))),
+        Pipeline::ALL.map(|pipeline| {
+            render("", &format!("Pipeline: {}", pipeline.name()), Action::Pipeline(pipeline))
+        }),
     );
     commands.extend(Show::ALL.map(|(show, name)| render("", &format!("Show: {name}"), Action::Show(show))));
     commands
@@ -260,7 +275,9 @@ pub fn typed_after_palette_key(context: &egui::Context) -> String {
     };
     context.input(|input| {
         let after = input.events.iter().skip_while(|event| !opens(event)).skip(1);
-        after.filter_map(|event| if let egui::Event::Text(text) = event { Some(text.as_str()) } else { None }).collect()
+        after
+            .filter_map(|event| if let egui::Event::Text(text) = event { Some(text.as_str()) } else { None })
+            .collect()
     })
 }
 
@@ -300,9 +317,9 @@ pub fn pressed(context: &egui::Context, typing: bool) -> Vec<Action> {
             return None;
         }
         let known = commands.iter().filter_map(|c| Some((c.shortcut?, &c.action)));
-        let found = known.into_iter().find(|(shortcut, _)| {
-            shortcut.logical_key == key && modifiers.matches_exact(shortcut.modifiers)
-        });
+        let found = known
+            .into_iter()
+            .find(|(shortcut, _)| shortcut.logical_key == key && modifiers.matches_exact(shortcut.modifiers));
         let alias = || aliases().into_iter().find(|(m, k, _)| *k == key && modifiers.matches_exact(*m));
         found.map(|(_, action)| action.clone()).or_else(|| alias().map(|(_, _, action)| action))
     };
@@ -334,8 +351,10 @@ mod tests {
         let context = egui::Context::default();
         let ask = |(modifiers, key): (Modifiers, Key), typing| {
             let mut actions = Vec::new();
-            let event = |pressed| egui::Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
-            let input = egui::RawInput { events: vec![event(true), event(false)], ..egui::RawInput::default() };
+            let event =
+                |pressed| egui::Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
+            let input =
+                egui::RawInput { events: vec![event(true), event(false)], ..egui::RawInput::default() };
             context.run_ui(input, |ui| actions = pressed(ui.ctx(), typing)).drop_without_applying_deltas();
             actions
         };

@@ -78,7 +78,13 @@ mod tests {
 
     const FULL: [u32; 2] = [1280, 720];
 
-    fn run(resolution: &mut AdaptiveResolution, start: Instant, frames: u32, moving: bool, ms_full: f64) -> u32 {
+    fn run(
+        resolution: &mut AdaptiveResolution,
+        start: Instant,
+        frames: u32,
+        moving: bool,
+        ms_full: f64,
+    ) -> u32 {
         let mut divisor = 1;
         for frame in 0..frames {
             let now = start + Duration::from_millis(u64::from(frame) * 20);
@@ -113,7 +119,8 @@ mod tests {
 
     #[test]
     fn switched_off_it_is_always_full() {
-        let mut resolution = AdaptiveResolution { ms_per_megapixel: Some(1e4), ..AdaptiveResolution::default() };
+        let mut resolution =
+            AdaptiveResolution { ms_per_megapixel: Some(1e4), ..AdaptiveResolution::default() };
         assert_eq!(resolution.next(Instant::now(), true, FULL, None), 1);
     }
 }

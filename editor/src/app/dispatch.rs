@@ -1,7 +1,8 @@
 //! Carries out actions. Enters: an action. Leaves: edits pushed to the session, a moved camera, changed memory.
 
 use caustica_scene::{
-    Camera, Edit, Environment, Light, LightKind, Local, Node, NodeId, NodeKind, PrefabId, Projection, Target, Trs,
+    Camera, Edit, Environment, Light, LightKind, Local, Node, NodeId, NodeKind, PrefabId, Projection, Target,
+    Trs,
 };
 use glam::{DQuat, DVec3, Vec3};
 
@@ -34,7 +35,8 @@ impl Editor {
             Action::Rename => self.rename(),
             Action::ToggleVisible => self.toggle_visible(),
             Action::SelectAll => {
-                let roots: Vec<Target> = self.session.document().roots().iter().copied().map(Target::node).collect();
+                let roots: Vec<Target> =
+                    self.session.document().roots().iter().copied().map(Target::node).collect();
                 self.state.selection.set_all(roots);
             }
             Action::SelectNone => self.state.selection.clear(),
@@ -96,9 +98,12 @@ impl Editor {
     /// Selected nodes that hang below no other selected one; parts inside instances cannot be copied or removed.
     fn selected_nodes(&mut self) -> Vec<NodeId> {
         let tops = self.state.selection.tops(self.session.document());
-        let nodes: Vec<NodeId> = tops.iter().filter(|target| target.part.is_none()).map(|target| target.node).collect();
+        let nodes: Vec<NodeId> =
+            tops.iter().filter(|target| target.part.is_none()).map(|target| target.node).collect();
         if nodes.is_empty() && !tops.is_empty() {
-            self.state.toasts.warning("A part inside an instance belongs to its file: hide it instead, or select the instance.");
+            self.state.toasts.warning(
+                "A part inside an instance belongs to its file: hide it instead, or select the instance.",
+            );
         }
         nodes
     }
@@ -120,7 +125,8 @@ impl Editor {
             return;
         }
         let made = self.session.edit_with(|document| {
-            let copies: Vec<(NodeId, Edit)> = nodes.iter().filter_map(|&id| document.duplicate_edit(id).ok()).collect();
+            let copies: Vec<(NodeId, Edit)> =
+                nodes.iter().filter_map(|&id| document.duplicate_edit(id).ok()).collect();
             let label = match nodes.as_slice() {
                 [one] => format!("duplicated {}", document.display_name((*one).into())),
                 _ => format!("duplicated {} objects", nodes.len()),
@@ -169,7 +175,8 @@ impl Editor {
             let mut edits = vec![add];
             for &node in &nodes {
                 let same_parent = document.node(node).is_some_and(|n| n.parent == parent);
-                let local = match (same_parent, document.local(node.into()), document.world_from(node.into())) {
+                let local = match (same_parent, document.local(node.into()), document.world_from(node.into()))
+                {
                     (true, Some(local), _) => local,
                     (_, _, Some(world)) => Local::from_affine(parent_from_world * world),
                     _ => continue,
@@ -281,7 +288,9 @@ impl Editor {
         let document = self.session.document();
         let selected = self.state.selection.targets().iter().filter_map(|target| {
             // Lights and cameras have no size of their own: some room around their place.
-            let own = || document.world_from(*target).map(|world| (world.translation - 0.25, world.translation + 0.25));
+            let own = || {
+                document.world_from(*target).map(|world| (world.translation - 0.25, world.translation + 0.25))
+            };
             document.bounds_of(*target).or_else(own)
         });
         let join = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));

@@ -82,7 +82,8 @@ impl Editor {
 
     /// Text for the window's title bar.
     pub fn title(&self) -> String {
-        let name = self.session.path().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+        let name =
+            self.session.path().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
         let mark = if self.session.is_modified() { "\u{2022} " } else { "" };
         format!("{mark}{} \u{2013} Caustica", name.as_deref().unwrap_or("unsaved scene"))
     }
@@ -92,7 +93,8 @@ impl Editor {
         if !self.session.is_modified() {
             return None;
         }
-        let folder = self.session.path().and_then(Path::parent).map_or_else(std::env::temp_dir, Path::to_path_buf);
+        let folder =
+            self.session.path().and_then(Path::parent).map_or_else(std::env::temp_dir, Path::to_path_buf);
         let path = folder.join(format!("rescued-{}.caustica.json", std::process::id()));
         let meta = caustica_scene::ProjectMeta::default();
         match caustica_scene::Project::save(&path, self.session.document(), &meta) {
@@ -153,8 +155,8 @@ impl Editor {
     }
 
     fn take_dropped_files(&mut self, context: &Context) {
-        let dropped: Vec<PathBuf> =
-            context.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
+        let dropped: Vec<PathBuf> = context
+            .input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
         for path in dropped {
             self.drop_file(path);
         }
@@ -222,7 +224,8 @@ impl Editor {
             ui.add_space(16.0);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let save = ui.button("Save").on_hover_text("Save, then go on");
-                if self.state.view.extent_px.is_some() && context.memory(|memory| memory.focused().is_none()) {
+                if self.state.view.extent_px.is_some() && context.memory(|memory| memory.focused().is_none())
+                {
                     save.request_focus();
                 }
                 if save.clicked() {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::editor::{Editor, Then};
-use crate::dialogs::{ENVIRONMENT_ENDINGS, MODEL_ENDINGS, Wish};
+use crate::dialogs::{ENVIRONMENT_ENDINGS, MODEL_ENDINGS, PROJECT_ENDING, Wish};
 use crate::session::{self, Loaded};
 use crate::ui_state::ToastKind;
 use crate::worker::{Answer, Job, Progress};
@@ -43,9 +43,22 @@ impl Editor {
             Some(path) => path.parent().map(Path::to_path_buf),
             None => None,
         };
-        let name = self.session.path().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
-        let name = name.unwrap_or_else(|| "scene.caustica.json".to_owned());
+        let name = self.file_name();
         self.dialogs.ask(wish, folder.as_deref(), &name, &self.wake);
+    }
+
+    /// The project's file name; before it has one, the name of the first model in it.
+    fn file_name(&self) -> String {
+        if let Some(name) = self.session.path().and_then(Path::file_name) {
+            return name.to_string_lossy().into_owned();
+        }
+        let model = self
+            .session
+            .document()
+            .prefabs()
+            .map(|(_, prefab)| prefab.name.as_str())
+            .find(|name| !name.is_empty());
+        format!("{}.{PROJECT_ENDING}", model.unwrap_or("scene"))
     }
 
     /// A dialog gave a file name.
@@ -94,7 +107,9 @@ impl Editor {
             Answer::Running => self.loading = Some(loading),
             Answer::Died => {
                 let path = loading.path.display();
-                self.state.toasts.error(format!("{path}: reading the file failed in a way that was not foreseen; see the log."));
+                self.state.toasts.error(format!(
+                    "{path}: reading the file failed in a way that was not foreseen; see the log."
+                ));
             }
             Answer::Done(Err(error)) => self.state.toasts.error(format!("{error:#}")),
             Answer::Done(Ok(loaded)) => {

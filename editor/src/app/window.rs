@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use caustica_renderer::ViewSettings;
 use caustica_renderer::gpu::{
-    Access, Device, DeviceOptions, GpuError, Instance, InstanceOptions, Recorder, Requirements, Stage, Swapchain, Use,
+    Access, Device, DeviceOptions, GpuError, Instance, InstanceOptions, Recorder, Requirements, Stage,
+    Swapchain, Use,
 };
 use egui::ViewportId;
 use egui::epaint::ClippedPrimitive;
@@ -29,8 +30,8 @@ use crate::ui_renderer::UiRenderer;
 use crate::ui_state::Config;
 use crate::worker::Wake;
 
-/// A device that takes longer than this for a picture repaints the panels in between while there is input.
-const SLOW_MS: f64 = 40.0;
+/// A device that takes longer than this from one submit to the next repaints the panels alone while there is input.
+const SLOW_MS: f64 = 80.0;
 /// Longest time without a new picture while there is input.
 const PICTURE_AT_LEAST_EVERY: Duration = Duration::from_millis(250);
 
@@ -68,6 +69,10 @@ pub(super) struct EditorWindow {
     /// A picture that could not be rendered; it is tried again when something changes.
     broken: Option<PictureKey>,
     last_picture: Instant,
+    /// The next picture follows the last one without a pause or a frame of panels alone.
+    continuous: bool,
+    /// Milliseconds from one picture to the next while they follow each other, smoothed.
+    interval_ms: f64,
     had_input: bool,
     must_resize: bool,
     occluded: bool,
@@ -96,9 +101,13 @@ impl EditorWindow {
         let window = Arc::new(event_loop.create_window(attributes).context("opening the window")?);
         let display = window.display_handle().context("asking for the display")?.as_raw();
         let handle = window.window_handle().context("asking for the window")?.as_raw();
-        let instance = Instance::new(InstanceOptions { validation: options.validation, display: Some(display) })?;
+        let instance =
+            Instance::new(InstanceOptions { validation: options.validation, display: Some(display) })?;
         let requirements = Requirements { device: options.device.clone(), present: true };
-        let device = Device::new(&instance, &DeviceOptions { requirements, memory_limit_bytes: None })?;
+        let device = Device::new(
+            &instance,
+            &DeviceOptions { requirements, memory_limit_bytes: options.memory_limit_bytes },
+        )?;
         let size = window.inner_size();
         let swapchain = Swapchain::new(&device, display, handle, [size.width, size.height])?;
         let ui = UiRenderer::new(&device, &swapchain)?;
@@ -108,7 +117,8 @@ impl EditorWindow {
         context.options_mut(|options| options.max_passes = std::num::NonZeroUsize::MIN);
         let max_side = device.limits().max_image_extent as usize;
         let scale = Some(window.scale_factor() as f32);
-        let input = egui_winit::State::new(context.clone(), ViewportId::ROOT, &window, scale, None, Some(max_side));
+        let input =
+            egui_winit::State::new(context.clone(), ViewportId::ROOT, &window, scale, None, Some(max_side));
         let session = Session::new(
             &device,
             SessionOptions {
@@ -135,6 +145,8 @@ impl EditorWindow {
             shown: None,
             broken: None,
             last_picture: Instant::now(),
+            continuous: false,
+            interval_ms: 0.0,
             had_input: false,
             must_resize: false,
             occluded: false,
@@ -228,7 +240,8 @@ impl EditorWindow {
         let recorder = self.picture()?;
         self.present(recorder, output.pixels_per_point, primitives)?;
         self.had_input = false;
-        let delay = output.viewport_output.get(&ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
+        let delay =
+            output.viewport_output.get(&ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
         self.plan_next(delay);
         Ok(())
     }
@@ -256,16 +269,27 @@ impl EditorWindow {
 
     /// Renders the view where that is due; else only opens a frame for the panels.
     fn picture(&mut self) -> anyhow::Result<Recorder> {
-        let Some(full) = self.editor.state.view.extent_px else { return self.editor.session.begin_ui_frame() };
+        let (recorder, is_picture) = self.picture_or_panels()?;
+        self.continuous = is_picture;
+        Ok(recorder)
+    }
+
+    /// True: the recorder holds a picture.
+    fn picture_or_panels(&mut self) -> anyhow::Result<(Recorder, bool)> {
+        let Some(full) = self.editor.state.view.extent_px else {
+            return self.panels_alone();
+        };
         let key = self.key(full);
         let fresh = self.shown.as_ref() == Some(&key);
-        let moving = self.shown.as_ref().is_some_and(|shown| shown.camera != key.camera || shown.state != key.state)
-            || self.editor.state.view.drag.is_some()
-            || self.editor.state.view.flying;
-        let waits = fresh && self.had_input && self.is_slow() && self.last_picture.elapsed() < PICTURE_AT_LEAST_EVERY;
+        let moving =
+            self.shown.as_ref().is_some_and(|shown| shown.camera != key.camera || shown.state != key.state)
+                || self.editor.state.view.drag.is_some()
+                || self.editor.state.view.flying;
+        let waits =
+            fresh && self.had_input && self.is_slow() && self.last_picture.elapsed() < PICTURE_AT_LEAST_EVERY;
         let done = fresh && self.editor.session.is_converged();
         if waits || done || self.broken.as_ref() == Some(&key) {
-            return self.editor.session.begin_ui_frame();
+            return self.panels_alone();
         }
         let config = &self.editor.state.config;
         let target_ms = config.adaptive.then_some(f64::from(config.target_frame_ms));
@@ -275,17 +299,20 @@ impl EditorWindow {
             Ok(recorder) => {
                 self.broken = None;
                 self.shown = Some(key);
-                self.last_picture = Instant::now();
                 self.note_times();
-                Ok(recorder)
+                Ok((recorder, true))
             }
             Err(error) if is_fatal(&error) => Err(error),
             Err(error) => {
                 self.editor.state.toasts.error(format!("The picture cannot be rendered: {error:#}."));
                 self.broken = Some(key);
-                self.editor.session.begin_ui_frame()
+                self.panels_alone()
             }
         }
+    }
+
+    fn panels_alone(&mut self) -> anyhow::Result<(Recorder, bool)> {
+        Ok((self.editor.session.begin_ui_frame()?, false))
     }
 
     fn key(&self, extent: [u32; 2]) -> PictureKey {
@@ -295,18 +322,27 @@ impl EditorWindow {
     }
 
     fn note_times(&mut self) {
+        let now = Instant::now();
+        if self.continuous {
+            let interval_ms = now.duration_since(self.last_picture).as_secs_f64() * 1e3;
+            self.interval_ms += (interval_ms - self.interval_ms) * 0.3;
+        }
+        self.last_picture = now;
         let ms: f64 = self.editor.session.statistics().passes.iter().map(|(_, ms)| ms).sum();
         self.adaptive.measured(ms);
-        let smoothed = &mut self.editor.state.view.frame_ms;
-        *smoothed += (ms - *smoothed) * 0.2;
     }
 
     fn is_slow(&self) -> bool {
-        self.editor.state.view.frame_ms > SLOW_MS
+        self.interval_ms > SLOW_MS
     }
 
     /// Draws the panels over the picture and shows them.
-    fn present(&mut self, mut recorder: Recorder, points: f32, primitives: Vec<ClippedPrimitive>) -> anyhow::Result<()> {
+    fn present(
+        &mut self,
+        mut recorder: Recorder,
+        points: f32,
+        primitives: Vec<ClippedPrimitive>,
+    ) -> anyhow::Result<()> {
         if let Some(image) = self.editor.session.window_image() {
             self.ui.set_view(image)?;
             recorder.declare(&[Use::Image(image, Stage::Raster, Access::Sampled)]);
@@ -324,7 +360,8 @@ impl EditorWindow {
             self.window.request_redraw();
             return Ok(());
         };
-        let clear = theme::window_color(self.editor.state.config.dark).to_array().map(|c| f32::from(c) / 255.0);
+        let clear =
+            theme::window_color(self.editor.state.config.dark).to_array().map(|c| f32::from(c) / 255.0);
         let extent = self.swapchain.extent();
         let (swapchain, ui) = (&self.swapchain, &mut self.ui);
         let mut drawn = Ok(());
@@ -356,6 +393,7 @@ impl EditorWindow {
             self.broken.as_ref() != Some(&key) && !(fresh && self.editor.session.is_converged())
         });
         let goes_on = unfinished && !self.occluded;
+        self.continuous &= goes_on;
         if goes_on && self.is_slow() && !repaint_delay.is_zero() {
             // Never two slow pictures in a row on the queue: panels that react to input would wait for both.
             self.waits_for_device = true;
@@ -379,7 +417,10 @@ impl Drop for EditorWindow {
 /// Whether the device is gone, so that nothing can be drawn any more.
 fn is_fatal(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
-        matches!(cause.downcast_ref::<GpuError>(), Some(GpuError::DeviceLost { .. } | GpuError::Timeout { .. }))
+        matches!(
+            cause.downcast_ref::<GpuError>(),
+            Some(GpuError::DeviceLost { .. } | GpuError::Timeout { .. })
+        )
     }) || matches!(
         error.downcast_ref::<caustica_renderer::RendererError>(),
         Some(caustica_renderer::RendererError::Gpu(GpuError::DeviceLost { .. } | GpuError::Timeout { .. }))

@@ -151,7 +151,9 @@ pub(super) fn run(
         session.set_camera(ViewCamera::of_document(session.document(), Some(name)));
     }
     session.set_settings(settings_of(args, session.settings().clone()));
-    session.set_sample_offset(args.sample_offset)?;
+    if args.sample_offset > 0 {
+        session.set_sample_offset(args.sample_offset)?;
+    }
     let loaded_in = start.elapsed();
     let run = accumulate(&mut session, args, &progress)?;
     progress.finish_and_clear();
@@ -164,7 +166,7 @@ pub(super) fn run(
         seed: session.settings().seed,
     };
     let accumulated = session.read_back()?;
-    let noise = noise_of(&accumulated);
+    let noise = noise_of(&accumulated, metadata.samples);
     match kind {
         Kind::Exr => output::write_exr(&args.output, args.size, &accumulated.mean, &metadata)?,
         Kind::Png => output::write_png(&args.output, args.size, &session.read_display()?)?,
@@ -174,14 +176,14 @@ pub(super) fn run(
         println!("{}", summary(args, session.statistics(), &metadata, &run, noise, loaded_in));
     } else {
         println!(
-            "{}: {}x{}, {} samples in {:.2} s ({}), noise {:.2} %, {}",
+            "{}: {}x{}, {} samples in {:.2} s ({}), noise {}, {}",
             args.output.display(),
             args.size[0],
             args.size[1],
             metadata.samples,
             metadata.seconds,
             metadata.pipeline,
-            noise * 100.0,
+            noise.map_or_else(|| String::from("unknown"), |noise| format!("{:.2} %", noise * 100.0)),
             metadata.device
         );
     }
@@ -258,7 +260,7 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
         if let Some(target) = args.target_error
             && done >= 16
             && done.is_power_of_two()
-            && noise_of(&session.read_back()?) <= target
+            && noise_of(&session.read_back()?, done).is_some_and(|noise| noise <= target)
         {
             break;
         }
@@ -268,8 +270,12 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     Ok(Run { seconds: start.elapsed().as_secs_f64(), frames })
 }
 
-/// sqrt(relMSE) of the mean by the two streams: their half difference has the variance of the mean.
-fn noise_of(image: &caustica_renderer::Accumulated) -> f64 {
+/// sqrt(relMSE) of the mean by the two streams: their half difference has the variance of the mean. `None` with one
+/// sample, which fills one stream only.
+fn noise_of(image: &caustica_renderer::Accumulated, samples: u64) -> Option<f64> {
+    if samples < 2 {
+        return None;
+    }
     let terms = image.mean.iter().flatten().zip(image.half_difference.iter().flatten());
     let sum: f64 = terms
         .map(|(mean, half)| {
@@ -277,7 +283,7 @@ fn noise_of(image: &caustica_renderer::Accumulated) -> f64 {
             half * half / (mean * mean + 0.01)
         })
         .sum();
-    (sum / (image.mean.len().max(1) * 3) as f64).sqrt()
+    Some((sum / (image.mean.len().max(1) * 3) as f64).sqrt())
 }
 
 fn summary(
@@ -285,7 +291,7 @@ fn summary(
     statistics: &Statistics,
     metadata: &Metadata,
     run: &Run,
-    noise: f64,
+    noise: Option<f64>,
     loaded_in: Duration,
 ) -> serde_json::Value {
     let passes: serde_json::Map<String, serde_json::Value> =

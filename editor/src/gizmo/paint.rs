@@ -3,9 +3,7 @@
 use egui::{Color32, Painter, Pos2, Shape, Stroke, Vec2};
 use glam::{DVec2, DVec3};
 
-use super::{
-    AXIS_START, Frame, Handle, Motion, Tool, VIEW_RING, axis_is_usable, is_front, plane_is_usable,
-};
+use super::{AXIS_START, Frame, Handle, Motion, Tool, VIEW_RING, axis_is_usable, is_front, plane_is_usable};
 use crate::projection::ViewProjection;
 
 const AXIS_COLORS: [Color32; 3] =
@@ -108,7 +106,8 @@ impl GizmoPicture<'_> {
         if !self.shown(handle) {
             return;
         }
-        let corners: Vec<_> = self.frame.plane_corners(axis).into_iter().filter_map(|c| self.point(c)).collect();
+        let corners: Vec<_> =
+            self.frame.plane_corners(axis).into_iter().filter_map(|c| self.point(c)).collect();
         if corners.len() == 4 {
             let color = self.color(handle, AXIS_COLORS[axis]);
             painter.add(Shape::convex_polygon(corners, color.gamma_multiply(0.35), Stroke::new(1.2, color)));
@@ -116,12 +115,12 @@ impl GizmoPicture<'_> {
     }
 
     fn paint_rings(&self, painter: &Painter) {
-        for axis in 0..3 {
+        for (axis, rest) in AXIS_COLORS.into_iter().enumerate() {
             let handle = Handle::Ring(axis);
             if !self.shown(handle) {
                 continue;
             }
-            let color = self.color(handle, AXIS_COLORS[axis]);
+            let color = self.color(handle, rest);
             let line = self.frame.circle(self.frame.axes[axis], 1.0, 96);
             for pair in line.windows(2) {
                 let front = is_front(self.frame, self.view, pair[0]);

@@ -59,7 +59,9 @@ fn an_axis_drag_moves_exactly_as_far_as_the_pointer_shows() {
         let (from, to) = (frame.at(axis, 0.8), frame.at(axis, 0.8) + frame.axes[axis] * 1.7);
         let mut drag = Drag::new(Tool::Move, Handle::Axis(axis), frame, point(&view, from));
         // The pointer may leave the axis sideways: only the part along it counts.
-        let Motion::Translate(moved) = drag.motion(&view, point(&view, to), false).unwrap() else { unreachable!() };
+        let Motion::Translate(moved) = drag.motion(&view, point(&view, to), false).unwrap() else {
+            unreachable!()
+        };
         assert!((moved - frame.axes[axis] * 1.7).length() < 1e-9, "{axis}: {moved}");
     }
 }
@@ -95,7 +97,9 @@ fn a_ring_turns_by_the_angle_between_the_places() {
         let arm = normal.any_orthonormal_vector() * frame.size_m;
         let mut drag = Drag::new(Tool::Rotate, Handle::Ring(axis), frame, point(&view, arm));
         let pointer = point(&view, DQuat::from_axis_angle(normal, 0.8) * arm);
-        let Motion::Rotate { angle_rad, .. } = drag.motion(&view, pointer, false).unwrap() else { unreachable!() };
+        let Motion::Rotate { angle_rad, .. } = drag.motion(&view, pointer, false).unwrap() else {
+            unreachable!()
+        };
         assert!((angle_rad - 0.8).abs() < 1e-9, "{axis}: {angle_rad}");
     }
 }

@@ -23,7 +23,9 @@ pub fn menu(cx: &mut Cx<'_>, ui: &mut Ui, shown_tabs: &[Tab]) {
         ui.menu_button("Help", |ui| {
             of(&commands, Menu::Help).for_each(|command| entry(cx, ui, command, true));
             ui.separator();
-            of(&commands, Menu::File).filter(|c| c.action == Action::Quit).for_each(|command| entry(cx, ui, command, true));
+            of(&commands, Menu::File)
+                .filter(|c| c.action == Action::Quit)
+                .for_each(|command| entry(cx, ui, command, true));
         });
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let device = cx.session.device();
@@ -77,7 +79,8 @@ fn recent_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_enabled_ui(!recent.is_empty(), |ui| {
         ui.menu_button(format!("{}  Open recent", icon::CLOCK_COUNTER_CLOCKWISE), |ui| {
             for path in recent {
-                let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+                let name =
+                    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
                 if ui.button(name).on_hover_text(path.display().to_string()).clicked() {
                     cx.act(Action::OpenPath(path));
                     ui.close();
@@ -116,7 +119,9 @@ fn edit_menu(cx: &mut Cx<'_>, ui: &mut Ui, commands: &[Command]) {
 fn add_menu(cx: &mut Cx<'_>, ui: &mut Ui, commands: &[Command]) {
     of(commands, Menu::Add).for_each(|command| entry(cx, ui, command, true));
     ui.separator();
-    of(commands, Menu::File).filter(|c| c.action == Action::Import).for_each(|command| entry(cx, ui, command, true));
+    of(commands, Menu::File)
+        .filter(|c| c.action == Action::Import)
+        .for_each(|command| entry(cx, ui, command, true));
     let prefabs: Vec<(PrefabId, String)> =
         cx.session.document().prefabs().map(|(id, prefab)| (id, prefab.name.clone())).collect();
     ui.add_enabled_ui(!prefabs.is_empty(), |ui| {
@@ -135,7 +140,9 @@ fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui, commands: &[Command], shown_tabs: &[T
     for command in of(commands, Menu::View) {
         match command.action {
             Action::ShowTab(_) => continue,
-            Action::AxisView(crate::camera_control::AxisView::Front) | Action::ToggleProjection | Action::ToggleTheme => {
+            Action::AxisView(crate::camera_control::AxisView::Front)
+            | Action::ToggleProjection
+            | Action::ToggleTheme => {
                 ui.separator();
             }
             _ => {}
@@ -213,7 +220,14 @@ pub fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
-fn history_button(cx: &mut Cx<'_>, ui: &mut Ui, mark: &str, name: &str, label: Option<String>, action: Action) {
+fn history_button(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    mark: &str,
+    name: &str,
+    label: Option<String>,
+    action: Action,
+) {
     let response = ui.add_enabled(label.is_some(), Button::new(RichText::new(mark).size(16.0)));
     let tip = label.map_or(format!("Nothing to {}", name.to_lowercase()), |label| format!("{name}: {label}"));
     if response.on_hover_text(&tip).on_disabled_hover_text(&tip).clicked() {
@@ -228,10 +242,13 @@ fn tool_button(cx: &mut Cx<'_>, ui: &mut Ui, command: &Command) {
         Action::ToggleSpace => {
             ui.separator();
             let local = cx.state.space == Space::Local;
-            let (mark, now) = if local { (icon::CUBE_FOCUS, "object's own") } else { (icon::GLOBE_SIMPLE, "world's") };
+            let (mark, now) =
+                if local { (icon::CUBE_FOCUS, "object's own") } else { (icon::GLOBE_SIMPLE, "world's") };
             (mark, local, format!("Handles follow the {now} axes ({key})"))
         }
-        Action::ToggleSnap => (command.icon, cx.state.snap, format!("Drags go in steps ({key}); Ctrl turns it round")),
+        Action::ToggleSnap => {
+            (command.icon, cx.state.snap, format!("Drags go in steps ({key}); Ctrl turns it round"))
+        }
         _ => (command.icon, false, command.name.clone()),
     };
     let button = Button::new(RichText::new(mark).size(16.0)).selected(on).min_size(egui::vec2(30.0, 26.0));
@@ -292,7 +309,8 @@ fn tlas_word(work: TlasWork) -> &'static str {
 }
 
 fn saved(cx: &Cx<'_>, ui: &mut Ui) {
-    let name = cx.session.path().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
+    let name =
+        cx.session.path().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
     let name = name.unwrap_or_else(|| "unsaved scene".to_owned());
     let (mark, color, tip) = if cx.session.is_modified() {
         (icon::CIRCLE, ui.visuals().warn_fg_color, "There are changes that are not saved (Ctrl+S)")

@@ -21,11 +21,19 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
                     new = value;
                 }
             };
-            entry(ui, Environment::Auto, "What the model asks for; else the sky when nothing shines, else black");
+            entry(
+                ui,
+                Environment::Auto,
+                "What the model asks for; else the sky when nothing shines, else black",
+            );
             entry(ui, Environment::DefaultSky, "A plain sky without a sun");
             entry(ui, Environment::Constant(Vec3::ONE), "The same light from all sides");
             let is_file = matches!(old, Environment::File(_));
-            if ui.selectable_label(is_file, "Image\u{2026}").on_hover_text("An equirectangular .hdr or .exr").clicked() {
+            if ui
+                .selectable_label(is_file, "Image\u{2026}")
+                .on_hover_text("An equirectangular .hdr or .exr")
+                .clicked()
+            {
                 choose_file = true;
             }
         });
@@ -63,7 +71,8 @@ fn constant_field(ui: &mut Ui, radiance: &mut Vec3) {
         let mut factor = strength;
         let recolored = ui.color_edit_button_rgb(&mut rgb).changed();
         let speed = f64::from(factor.max(0.1)) * 0.01;
-        let scaled = ui.add(DragValue::new(&mut factor).range(0.0..=1e6).speed(speed).prefix("\u{d7} ")).changed();
+        let scaled =
+            ui.add(DragValue::new(&mut factor).range(0.0..=1e6).speed(speed).prefix("\u{d7} ")).changed();
         if recolored || scaled {
             *radiance = Vec3::from(rgb) * factor;
         }

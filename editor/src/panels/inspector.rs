@@ -1,7 +1,9 @@
 //! The selected object: name, transform, materials, light, camera. Enters: the document. Leaves: edits; a drag of a
 //! field is one step of the history because its edits join.
 
-use caustica_scene::{Camera, Edit, Light, LightKind, Local, NodeKind, OverrideField, Projection, Target, Trs};
+use caustica_scene::{
+    Camera, Edit, Light, LightKind, Local, NodeKind, OverrideField, Projection, Target, Trs,
+};
 use egui::{DragValue, RichText, TextEdit, Ui};
 use egui_phosphor::regular as icon;
 use glam::DVec3;
@@ -37,7 +39,11 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
         name_field(cx, ui, target);
         let visible = cx.session.document().visible(target).unwrap_or(true);
         let eye = if visible { icon::EYE } else { icon::EYE_SLASH };
-        if ui.add(egui::Button::new(eye).frame(false)).on_hover_text("Show or hide this and everything below it").clicked() {
+        if ui
+            .add(egui::Button::new(eye).frame(false))
+            .on_hover_text("Show or hide this and everything below it")
+            .clicked()
+        {
             cx.push(Edit::SetVisible { target, visible: !visible });
         }
     });
@@ -74,7 +80,8 @@ fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     let mut result = Ok(());
 
     let speed = (trs.translation.abs().max_element() * 0.002).clamp(0.002, 1.0);
-    let moved = vector_field(ui, "Position", "Metres against the parent", trs.translation, speed, " m", DVec3::ZERO);
+    let moved =
+        vector_field(ui, "Position", "Metres against the parent", trs.translation, speed, " m", DVec3::ZERO);
     if let Some(translation) = moved {
         result = push(Trs { translation, ..trs });
     }
@@ -93,7 +100,10 @@ fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     }
     ui.checkbox(&mut cx.state.inspector.uniform_scale, "Scale all axes together");
     if matches!(local, Local::Matrix(_)) {
-        ui.colored_label(ui.visuals().warn_fg_color, "This transform has shear; changing a field removes it.");
+        ui.colored_label(
+            ui.visuals().warn_fg_color,
+            "This transform has shear; changing a field removes it.",
+        );
     }
     if let Err(error) = result {
         cx.state.toasts.error(format!("That cannot be done: {error}."));
@@ -173,7 +183,14 @@ fn light_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Light) {
         LightKind::Spot { radius_m, range_m, inner_rad, outer_rad } => {
             radius_field(ui, radius_m);
             range_field(ui, range_m);
-            angle_field(ui, "Inner cone", "Full strength inside this angle from the axis", inner_rad, 0.0, 89.0);
+            angle_field(
+                ui,
+                "Inner cone",
+                "Full strength inside this angle from the axis",
+                inner_rad,
+                0.0,
+                89.0,
+            );
             angle_field(ui, "Outer cone", "No light outside this angle from the axis", outer_rad, 0.1, 90.0);
             *inner_rad = inner_rad.min(*outer_rad);
         }
@@ -199,14 +216,18 @@ fn kind_menu(ui: &mut Ui, kind: &mut LightKind) {
     ];
     let same = |a: &LightKind| std::mem::discriminant(a) == std::mem::discriminant(kind);
     let name = kinds.iter().find(|(_, k)| same(k)).map_or("", |(name, _)| name);
-    egui::ComboBox::from_id_salt("light kind").selected_text(format!("{}  {name}", light_icon(kind))).show_ui(ui, |ui| {
-        for (name, new) in kinds {
-            let selected = std::mem::discriminant(&new) == std::mem::discriminant(kind);
-            if ui.selectable_label(selected, format!("{}  {name}", light_icon(&new))).clicked() && !selected {
-                *kind = new;
+    egui::ComboBox::from_id_salt("light kind")
+        .selected_text(format!("{}  {name}", light_icon(kind)))
+        .show_ui(ui, |ui| {
+            for (name, new) in kinds {
+                let selected = std::mem::discriminant(&new) == std::mem::discriminant(kind);
+                if ui.selectable_label(selected, format!("{}  {name}", light_icon(&new))).clicked()
+                    && !selected
+                {
+                    *kind = new;
+                }
             }
-        }
-    });
+        });
 }
 
 fn radius_field(ui: &mut Ui, radius_m: &mut f32) {
@@ -244,7 +265,14 @@ fn camera_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Camera) {
     let mut camera = old;
     match &mut camera.projection {
         Projection::Perspective { yfov_rad } => {
-            angle_field(ui, "Field of view", "From the lower to the upper edge of the picture", yfov_rad, 1.0, 170.0);
+            angle_field(
+                ui,
+                "Field of view",
+                "From the lower to the upper edge of the picture",
+                yfov_rad,
+                1.0,
+                170.0,
+            );
         }
         Projection::Orthographic { ymag_m } => {
             field(ui, "Half height", "Of the picture, metres", |ui| {
@@ -253,14 +281,17 @@ fn camera_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Camera) {
         }
     }
     field(ui, "Near", "Nothing nearer than this is seen", |ui| {
-        ui.add(DragValue::new(&mut camera.near_m).range(1e-6..=1e3).speed(0.001).max_decimals(5).suffix(" m"));
+        ui.add(
+            DragValue::new(&mut camera.near_m).range(1e-6..=1e3).speed(0.001).max_decimals(5).suffix(" m"),
+        );
     });
     if camera != old {
         cx.push(Edit::SetCamera { target, camera });
     }
     let chosen = cx.session.document().main_camera().is_some_and(|main| main.target == target);
     ui.horizontal(|ui| {
-        let button = egui::Button::new(format!("{}  Render with this camera", icon::APERTURE)).selected(chosen);
+        let button =
+            egui::Button::new(format!("{}  Render with this camera", icon::APERTURE)).selected(chosen);
         let tip = "The command line and the 0 key use this camera when none is named";
         if ui.add(button).on_hover_text(tip).clicked() && !chosen {
             cx.push(Edit::SetDefaultCamera(Some(target)));
@@ -278,9 +309,14 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     section(ui, "Source", |ui| {
         ui.label(RichText::new(&source).small()).on_hover_text("The file that this instance shows");
         if missing {
-            ui.colored_label(ui.visuals().error_fg_color, "The file was not found: nothing is shown in its place.");
+            ui.colored_label(
+                ui.visuals().error_fg_color,
+                "The file was not found: nothing is shown in its place.",
+            );
         }
-        if target.part.is_some() && ui.add_enabled(changed, egui::Button::new("Follow the source again")).clicked() {
+        if target.part.is_some()
+            && ui.add_enabled(changed, egui::Button::new("Follow the source again")).clicked()
+        {
             cx.push(Edit::ResetOverride { target, field: OverrideField::All });
         }
     });

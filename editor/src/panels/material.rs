@@ -50,12 +50,17 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
 fn edit_material(cx: &mut Cx<'_>, ui: &mut Ui, id: MaterialId, old: &Material) {
     let mut new = old.clone();
     mode_buttons(ui, &mut new);
-    field(ui, "Base colour", "Albedo of a rough surface, reflectance of metals and mirrors, tint of glass", |ui| {
-        let mut rgba = new.base_color.to_array();
-        ui.color_edit_button_rgba_unmultiplied(&mut rgba);
-        new.base_color = rgba.into();
-        texture_note(cx, ui, new.base_color_texture);
-    });
+    field(
+        ui,
+        "Base colour",
+        "Albedo of a rough surface, reflectance of metals and mirrors, tint of glass",
+        |ui| {
+            let mut rgba = new.base_color.to_array();
+            ui.color_edit_button_rgba_unmultiplied(&mut rgba);
+            new.base_color = rgba.into();
+            texture_note(cx, ui, new.base_color_texture);
+        },
+    );
     match new.mode {
         ShadingMode::Pbr => pbr_fields(cx, ui, &mut new),
         ShadingMode::Refractive => {
@@ -122,7 +127,10 @@ fn share_slider(ui: &mut Ui, value: &mut f32) {
 fn ior_field(ui: &mut Ui, ior: &mut f32) {
     field(ui, "IOR", "Index of refraction: how strongly light bends", |ui| {
         ui.add(DragValue::new(ior).range(1.0..=4.0).speed(0.005).max_decimals(3));
-        let name = IOR_PRESETS.iter().find(|(_, value)| (value - *ior).abs() < 5e-4).map_or("\u{2014}", |(name, _)| name);
+        let name = IOR_PRESETS
+            .iter()
+            .find(|(_, value)| (value - *ior).abs() < 5e-4)
+            .map_or("\u{2014}", |(name, _)| name);
         egui::ComboBox::from_id_salt("ior").selected_text(name).show_ui(ui, |ui| {
             for (name, value) in IOR_PRESETS {
                 if ui.selectable_label((value - *ior).abs() < 5e-4, format!("{name}  {value}")).clicked() {
@@ -160,7 +168,9 @@ fn emission_fields(cx: &Cx<'_>, ui: &mut Ui, material: &mut Material) {
         ui.color_edit_button_rgb(&mut rgb);
         material.emissive = rgb.into();
         let speed = f64::from(material.emissive_strength.abs().max(0.1)) * 0.01;
-        ui.add(DragValue::new(&mut material.emissive_strength).range(0.0..=1e9).speed(speed).prefix("\u{d7} "));
+        ui.add(
+            DragValue::new(&mut material.emissive_strength).range(0.0..=1e9).speed(speed).prefix("\u{d7} "),
+        );
         texture_note(cx, ui, material.emissive_texture);
     });
 }
@@ -178,7 +188,8 @@ fn alpha_field(ui: &mut Ui, material: &mut Material) {
             ui.selectable_value(&mut material.alpha, AlphaMode::Blend, "Blend");
         });
         if let AlphaMode::Mask { cutoff } = &mut material.alpha {
-            ui.add(DragValue::new(cutoff).range(0.0..=1.0).speed(0.005)).on_hover_text("Below this, nothing is there");
+            ui.add(DragValue::new(cutoff).range(0.0..=1.0).speed(0.005))
+                .on_hover_text("Below this, nothing is there");
         }
     });
 }
@@ -190,25 +201,36 @@ fn texture_note(cx: &Cx<'_>, ui: &mut Ui, used: Option<TextureUse>) {
     let space = if texture.srgb { "sRGB" } else { "linear" };
     let missing = if texture.placeholder { "; the image was not found" } else { "" };
     let color = if texture.placeholder { ui.visuals().warn_fg_color } else { ui.visuals().weak_text_color() };
-    ui.label(RichText::new(icon::IMAGE).color(color))
-        .on_hover_text(format!("{name}, {} \u{d7} {} texels, {space}{missing}", texture.width, texture.height));
+    ui.label(RichText::new(icon::IMAGE).color(color)).on_hover_text(format!(
+        "{name}, {} \u{d7} {} texels, {space}{missing}",
+        texture.width, texture.height
+    ));
 }
 
 /// Gives this primitive a material of its own when others use the same.
-fn own_copy(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, primitive: u32, id: MaterialId, material: &Material) {
+fn own_copy(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    target: Target,
+    primitive: u32,
+    id: MaterialId,
+    material: &Material,
+) {
     let tip = "Other objects may use this material too; a copy changes this object alone";
     if !ui.button(format!("{}  Make a copy for this object", icon::COPY)).on_hover_text(tip).clicked() {
         return;
     }
     let mut value = material.clone();
-    value.name = if value.name.is_empty() { format!("material {} copy", id.0) } else { format!("{} copy", value.name) };
+    value.name = if value.name.is_empty() {
+        format!("material {} copy", id.0)
+    } else {
+        format!("{} copy", value.name)
+    };
     let made = cx.session.edit_with(|document| {
         let material = MaterialId(document.allocate_id());
         let entry = Box::new(MaterialEntry { value, original: None });
-        let edits = vec![
-            Edit::AddMaterial { material, entry },
-            Edit::AssignMaterial { target, primitive, material },
-        ];
+        let edits =
+            vec![Edit::AddMaterial { material, entry }, Edit::AssignMaterial { target, primitive, material }];
         ((), Edit::batch("copied a material", edits))
     });
     if let Err(error) = made {

@@ -2,7 +2,9 @@
 //! Only the rows on the screen are drawn.
 
 use caustica_scene::{Edit, Target, is_degenerate};
-use egui::{Align2, Color32, CornerRadius, FontId, Key, Pos2, Rect, Response, ScrollArea, Sense, TextEdit, Ui, vec2};
+use egui::{
+    Align2, Color32, CornerRadius, FontId, Key, Pos2, Rect, Response, ScrollArea, Sense, TextEdit, Ui, vec2,
+};
 use egui_phosphor::regular as icon;
 
 use super::{Cx, target_icon};
@@ -21,7 +23,11 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
     let count = cx.state.outliner.rows().len();
     if count == 0 {
         let searching = !cx.state.outliner.search.trim().is_empty();
-        let note = if searching { "Nothing has this name." } else { "The scene is empty. Drop a model here, or File > Import." };
+        let note = if searching {
+            "Nothing has this name."
+        } else {
+            "The scene is empty. Drop a model here, or File > Import."
+        };
         super::empty_note(ui, note);
         return;
     }
@@ -31,7 +37,8 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         && let Some(index) = cx.state.outliner.rows().iter().position(|row| row.target == target)
     {
         let offset = index as f32 * ROW - ui.available_height() * 0.4;
-        area = area.vertical_scroll_offset(offset.clamp(0.0, (count as f32 * ROW - ui.available_height()).max(0.0)));
+        area = area
+            .vertical_scroll_offset(offset.clamp(0.0, (count as f32 * ROW - ui.available_height()).max(0.0)));
     }
     area.show_rows(ui, ROW, count, |ui, range| {
         for index in range {
@@ -52,7 +59,11 @@ fn search_box(cx: &mut Cx<'_>, ui: &mut Ui) {
             .desired_width(ui.available_width() - clear_width - ui.spacing().item_spacing.x);
         ui.add(edit).on_hover_text("Shows objects whose name contains this, with everything above them");
         let clear = egui::Button::new(icon::X).frame(false);
-        if ui.add_enabled(!cx.state.outliner.search.is_empty(), clear).on_hover_text("Clear the search").clicked() {
+        if ui
+            .add_enabled(!cx.state.outliner.search.is_empty(), clear)
+            .on_hover_text("Clear the search")
+            .clicked()
+        {
             cx.state.outliner.search.clear();
         }
     });
@@ -95,7 +106,11 @@ fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, ey
     let selected = cx.state.selection.contains(row.target);
     let hovered = response.hovered() || eye.hovered();
     if selected || hovered {
-        let fill = if selected { visuals.selection.bg_fill } else { visuals.widgets.hovered.weak_bg_fill.gamma_multiply(0.5) };
+        let fill = if selected {
+            visuals.selection.bg_fill
+        } else {
+            visuals.widgets.hovered.weak_bg_fill.gamma_multiply(0.5)
+        };
         painter.rect_filled(rect, CornerRadius::same(4), fill);
     }
     let own = document.visible(row.target).unwrap_or(true);
@@ -122,7 +137,8 @@ fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, ey
     let broken = document.world_from(row.target).is_some_and(|world| is_degenerate(&world));
     let right = rect.right() - ROW - if broken { 20.0 } else { 0.0 };
     let name_rect = Rect::from_min_max(Pos2::new(x, rect.top()), Pos2::new(right.max(x), rect.bottom()));
-    let job = egui::text::LayoutJob::simple_singleline(document.display_name(row.target), font.clone(), color);
+    let job =
+        egui::text::LayoutJob::simple_singleline(document.display_name(row.target), font.clone(), color);
     let galley = egui::WidgetText::from(job).into_galley(
         ui,
         Some(egui::TextWrapMode::Truncate),
@@ -134,16 +150,25 @@ fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, ey
         put(right, icon::WARNING, visuals.warn_fg_color);
     }
     if !own || hovered {
-        put(rect.right() - ROW + 5.0, if own { icon::EYE } else { icon::EYE_SLASH }, visuals.weak_text_color());
+        put(
+            rect.right() - ROW + 5.0,
+            if own { icon::EYE } else { icon::EYE_SLASH },
+            visuals.weak_text_color(),
+        );
     }
     if broken && response.hovered() {
-        response.show_tooltip_text("Left out of the picture: its scale is zero, or its place is no finite number");
+        response.show_tooltip_text(
+            "Left out of the picture: its scale is zero, or its place is no finite number",
+        );
     }
 }
 
 fn rename_ui(cx: &mut Cx<'_>, ui: &mut Ui, rect: Rect, row: Row) {
     let left = rect.left() + f32::from(row.depth) * INDENT + INDENT + 18.0;
-    let field = Rect::from_min_max(Pos2::new(left, rect.top() + 1.0), Pos2::new(rect.right() - 4.0, rect.bottom() - 1.0));
+    let field = Rect::from_min_max(
+        Pos2::new(left, rect.top() + 1.0),
+        Pos2::new(rect.right() - 4.0, rect.bottom() - 1.0),
+    );
     let Some((_, text)) = &mut cx.state.outliner.renaming else { return };
     let edit = TextEdit::singleline(text).id(ui.id().with("rename")).margin(vec2(4.0, 2.0));
     let response = ui.put(field, edit);
@@ -254,7 +279,8 @@ fn context_menu(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     ];
     for (icon, name, action, enabled) in entries {
         let button = egui::Button::new(format!("{icon}  {name}"));
-        let response = ui.add_enabled(enabled, button).on_disabled_hover_text("Not for a part inside an instance");
+        let response =
+            ui.add_enabled(enabled, button).on_disabled_hover_text("Not for a part inside an instance");
         if response.clicked() {
             cx.act(action);
             ui.close();

@@ -3,7 +3,10 @@
 
 use std::time::Instant;
 
-use egui::{Align2, Area, Color32, Context, Frame, Id, Key, Margin, Order, ProgressBar, RichText, ScrollArea, Stroke, TextEdit};
+use egui::{
+    Align2, Area, Color32, Context, Frame, Id, Key, Margin, Order, ProgressBar, RichText, ScrollArea, Stroke,
+    TextEdit,
+};
 use egui_phosphor::regular as icon;
 
 use crate::app::actions::{Action, Command, Menu, commands};
@@ -19,17 +22,25 @@ pub fn toasts(state: &mut UiState, context: &Context) {
     context.request_repaint_after(first - now);
     let mut closed = None;
     let corner = Align2::RIGHT_BOTTOM;
-    let from = if state.view.rect.is_positive() { state.view.rect.right_bottom() } else { context.content_rect().max };
-    Area::new(Id::new("toasts")).order(Order::Foreground).pivot(corner).fixed_pos(from - egui::vec2(12.0, 12.0)).show(
-        context,
-        |ui| {
+    let from = if state.view.rect.is_positive() {
+        state.view.rect.right_bottom()
+    } else {
+        context.content_rect().max
+    };
+    Area::new(Id::new("toasts"))
+        .order(Order::Foreground)
+        .pivot(corner)
+        .fixed_pos(from - egui::vec2(12.0, 12.0))
+        .show(context, |ui| {
             for (index, toast) in state.toasts.items.iter().enumerate() {
                 let (mark, color) = match toast.kind {
                     ToastKind::Info => (icon::CHECK_CIRCLE, crate::theme::accent(ui.visuals())),
                     ToastKind::Warning => (icon::WARNING, ui.visuals().warn_fg_color),
                     ToastKind::Error => (icon::X_CIRCLE, ui.visuals().error_fg_color),
                 };
-                let frame = Frame::popup(ui.style()).inner_margin(Margin::symmetric(12, 8)).stroke(Stroke::new(1.0, color));
+                let frame = Frame::popup(ui.style())
+                    .inner_margin(Margin::symmetric(12, 8))
+                    .stroke(Stroke::new(1.0, color));
                 frame.show(ui, |ui| {
                     ui.set_max_width(380.0);
                     ui.horizontal(|ui| {
@@ -42,8 +53,7 @@ pub fn toasts(state: &mut UiState, context: &Context) {
                 });
                 ui.add_space(4.0);
             }
-        },
-    );
+        });
     if let Some(index) = closed {
         state.toasts.items.remove(index);
     }
@@ -52,7 +62,11 @@ pub fn toasts(state: &mut UiState, context: &Context) {
 /// How far a job is; true: the user cancels it.
 pub fn progress(context: &Context, state: &UiState, label: &str, progress: &Progress) -> bool {
     let mut cancelled = false;
-    let at = if state.view.rect.is_positive() { state.view.rect.center_top() } else { context.content_rect().center_top() };
+    let at = if state.view.rect.is_positive() {
+        state.view.rect.center_top()
+    } else {
+        context.content_rect().center_top()
+    };
     Area::new(Id::new("progress"))
         .order(Order::Foreground)
         .pivot(Align2::CENTER_TOP)
@@ -96,7 +110,9 @@ pub fn palette(state: &mut UiState, context: &Context) {
     let shown = area.show(context, |ui| {
         Frame::popup(ui.style()).inner_margin(Margin::same(8)).show(ui, |ui| {
             ui.set_width(460.0);
-            let edit = TextEdit::singleline(&mut palette.text).hint_text("Type a command").desired_width(f32::INFINITY);
+            let edit = TextEdit::singleline(&mut palette.text)
+                .hint_text("Type a command")
+                .desired_width(f32::INFINITY);
             let response = ui.add(edit);
             response.request_focus();
             if response.changed() {
@@ -161,7 +177,8 @@ fn hits(commands: &[Command], text: &str) -> Vec<Command> {
         let name = format!("{} {}", menu_name(command.menu), command.name).to_lowercase();
         text.split_whitespace().all(|word| name.contains(word))
     };
-    let mut hits: Vec<_> = commands.iter().filter(|c| c.action != Action::Palette).filter(fits).cloned().collect();
+    let mut hits: Vec<_> =
+        commands.iter().filter(|c| c.action != Action::Palette).filter(fits).cloned().collect();
     hits.sort_by_key(|command| !command.name.to_lowercase().starts_with(&text));
     hits
 }
@@ -247,7 +264,10 @@ fn about(ui: &mut egui::Ui, session: &Session) {
 pub fn drop_hint(context: &Context) {
     let names: Vec<String> = context.input(|input| {
         let name = |file: &egui::HoveredFile| {
-            file.path.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned())
+            file.path
+                .as_ref()
+                .and_then(|path| path.file_name())
+                .map(|name| name.to_string_lossy().into_owned())
         };
         input.raw.hovered_files.iter().filter_map(name).collect()
     });
@@ -258,7 +278,13 @@ pub fn drop_hint(context: &Context) {
     let painter = context.layer_painter(egui::LayerId::new(Order::Foreground, Id::new("drop")));
     painter.rect_filled(rect, 0.0, Color32::from_black_alpha(150));
     let text = format!("{}  Drop {}", icon::DOWNLOAD_SIMPLE, names.join(", "));
-    painter.text(rect.center(), Align2::CENTER_CENTER, text, egui::FontId::proportional(22.0), Color32::WHITE);
+    painter.text(
+        rect.center(),
+        Align2::CENTER_CENTER,
+        text,
+        egui::FontId::proportional(22.0),
+        Color32::WHITE,
+    );
 }
 
 #[cfg(test)]

@@ -20,11 +20,15 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// A menu of pipelines.
 pub fn pipeline_menu(ui: &mut Ui, pipeline: &mut Pipeline) {
-    egui::ComboBox::from_id_salt("pipeline").selected_text(pipeline_name(*pipeline)).width(104.0).show_ui(ui, |ui| {
-        for choice in Pipeline::ALL {
-            ui.selectable_value(pipeline, choice, pipeline_name(choice)).on_hover_text(pipeline_tip(choice));
-        }
-    });
+    egui::ComboBox::from_id_salt("pipeline").selected_text(pipeline_name(*pipeline)).width(104.0).show_ui(
+        ui,
+        |ui| {
+            for choice in Pipeline::ALL {
+                ui.selectable_value(pipeline, choice, pipeline_name(choice))
+                    .on_hover_text(pipeline_tip(choice));
+            }
+        },
+    );
 }
 
 /// A menu of what is shown.
@@ -40,7 +44,10 @@ pub fn show_menu(ui: &mut Ui, show: &mut Show) {
 fn pipeline_name(pipeline: Pipeline) -> String {
     let name = pipeline.name();
     let mut letters = name.chars();
-    letters.next().map(|first| first.to_uppercase().collect::<String>() + letters.as_str()).unwrap_or_default()
+    letters
+        .next()
+        .map(|first| first.to_uppercase().collect::<String>() + letters.as_str())
+        .unwrap_or_default()
 }
 
 fn pipeline_tip(pipeline: Pipeline) -> &'static str {
@@ -61,11 +68,14 @@ fn picture(ui: &mut Ui, settings: &mut ViewSettings) {
         ui.add(Slider::new(&mut settings.exposure_ev, -10.0..=10.0).max_decimals(2).suffix(" EV"));
     });
     field(ui, "Tone map", "How radiance becomes a colour that a screen can show", |ui| {
-        egui::ComboBox::from_id_salt("tone map").selected_text(tone_name(settings.tone_map)).show_ui(ui, |ui| {
-            for choice in ToneMap::ALL {
-                ui.selectable_value(&mut settings.tone_map, choice, tone_name(choice));
-            }
-        });
+        egui::ComboBox::from_id_salt("tone map").selected_text(tone_name(settings.tone_map)).show_ui(
+            ui,
+            |ui| {
+                for choice in ToneMap::ALL {
+                    ui.selectable_value(&mut settings.tone_map, choice, tone_name(choice));
+                }
+            },
+        );
     });
 }
 
@@ -111,9 +121,18 @@ fn moving(cx: &mut Cx<'_>, ui: &mut Ui, settings: &mut ViewSettings) {
         ui.checkbox(&mut settings.temporal, "over time");
     });
     let config = &mut cx.state.config;
-    field(ui, "Resolution", "Lower it while something moves, so that a frame takes at most this long", |ui| {
-        ui.checkbox(&mut config.adaptive, "");
-        let drag = DragValue::new(&mut config.target_frame_ms).range(4.0..=500.0).speed(0.5).max_decimals(0).suffix(" ms");
-        ui.add_enabled(config.adaptive, drag);
-    });
+    field(
+        ui,
+        "Resolution",
+        "Lower it while something moves, so that a frame takes at most this long",
+        |ui| {
+            ui.checkbox(&mut config.adaptive, "");
+            let drag = DragValue::new(&mut config.target_frame_ms)
+                .range(4.0..=500.0)
+                .speed(0.5)
+                .max_decimals(0)
+                .suffix(" ms");
+            ui.add_enabled(config.adaptive, drag);
+        },
+    );
 }

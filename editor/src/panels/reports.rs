@@ -25,8 +25,10 @@ pub fn passes(cx: &mut Cx<'_>, ui: &mut Ui) {
         let entry = smoothed.entry(label.clone()).or_insert(*ms);
         *entry += (ms - *entry) * SMOOTHING;
     }
-    let rows: Vec<(String, f64)> =
-        passes.iter().map(|(label, ms)| (label.clone(), smoothed.get(label).copied().unwrap_or(*ms))).collect();
+    let rows: Vec<(String, f64)> = passes
+        .iter()
+        .map(|(label, ms)| (label.clone(), smoothed.get(label).copied().unwrap_or(*ms)))
+        .collect();
     let total: f64 = rows.iter().map(|(_, ms)| ms).sum();
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
@@ -69,7 +71,10 @@ fn pass_row(ui: &mut Ui, label: &str, ms: f64, total: f64, strong: bool) {
 pub fn left_out(cx: &mut Cx<'_>, ui: &mut Ui) {
     let left_out = &cx.session.statistics().left_out;
     if left_out.is_empty() {
-        super::empty_note(ui, "Nothing is left out: this scene needs everything, or leaving out is switched off (Render panel).");
+        super::empty_note(
+            ui,
+            "Nothing is left out: this scene needs everything, or leaving out is switched off (Render panel).",
+        );
         return;
     }
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
@@ -102,23 +107,28 @@ pub fn health(cx: &mut Cx<'_>, ui: &mut Ui) {
         return;
     }
     let mut clicked = None;
-    ScrollArea::vertical().auto_shrink([false, false]).show_rows(ui, 20.0, health.findings.len(), |ui, range| {
-        for finding in &health.findings[range] {
-            ui.horizontal(|ui| {
-                let (mark, color) = severity_mark(ui, finding.severity);
-                ui.colored_label(color, mark);
-                let name = RichText::new(&finding.name).strong();
-                if let Some(target) = target_of(&finding.subject) {
-                    if ui.link(name).on_hover_text("Select it").clicked() {
-                        clicked = Some(target);
+    ScrollArea::vertical().auto_shrink([false, false]).show_rows(
+        ui,
+        20.0,
+        health.findings.len(),
+        |ui, range| {
+            for finding in &health.findings[range] {
+                ui.horizontal(|ui| {
+                    let (mark, color) = severity_mark(ui, finding.severity);
+                    ui.colored_label(color, mark);
+                    let name = RichText::new(&finding.name).strong();
+                    if let Some(target) = target_of(&finding.subject) {
+                        if ui.link(name).on_hover_text("Select it").clicked() {
+                            clicked = Some(target);
+                        }
+                    } else {
+                        ui.label(name);
                     }
-                } else {
-                    ui.label(name);
-                }
-                ui.add(egui::Label::new(&finding.message).truncate());
-            });
-        }
-    });
+                    ui.add(egui::Label::new(&finding.message).truncate());
+                });
+            }
+        },
+    );
     if let Some(target) = clicked {
         cx.state.selection.set(target);
         cx.state.outliner.reveal(cx.session.document(), target);
@@ -150,25 +160,33 @@ pub fn log(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         if ui.small_button("Copy").on_hover_text("Puts all lines on the clipboard").clicked() {
             let text = cx.state.log.read(|lines| {
-                lines.iter().map(|line| format!("{:9.3} {:5} {}\n", line.seconds, line.level, line.text)).collect::<String>()
+                lines
+                    .iter()
+                    .map(|line| format!("{:9.3} {:5} {}\n", line.seconds, line.level, line.text))
+                    .collect::<String>()
             });
             ui.ctx().copy_text(text);
         }
     });
     let count = cx.state.log.read(|lines| lines.len());
-    ScrollArea::both().auto_shrink([false, false]).stick_to_bottom(true).show_rows(ui, 15.0, count, |ui, range| {
-        cx.state.log.read(|lines| {
-            for line in lines.range(range.start.min(lines.len())..range.end.min(lines.len())) {
-                let color = match line.level {
-                    tracing::Level::ERROR => ui.visuals().error_fg_color,
-                    tracing::Level::WARN => ui.visuals().warn_fg_color,
-                    tracing::Level::INFO => ui.visuals().text_color(),
-                    _ => ui.visuals().weak_text_color(),
-                };
-                let text = format!("{:9.3}  {}", line.seconds, line.text);
-                let label = egui::Label::new(RichText::new(text).monospace().color(color)).extend();
-                ui.add(label).on_hover_text(&line.target);
-            }
-        });
-    });
+    ScrollArea::both().auto_shrink([false, false]).stick_to_bottom(true).show_rows(
+        ui,
+        15.0,
+        count,
+        |ui, range| {
+            cx.state.log.read(|lines| {
+                for line in lines.range(range.start.min(lines.len())..range.end.min(lines.len())) {
+                    let color = match line.level {
+                        tracing::Level::ERROR => ui.visuals().error_fg_color,
+                        tracing::Level::WARN => ui.visuals().warn_fg_color,
+                        tracing::Level::INFO => ui.visuals().text_color(),
+                        _ => ui.visuals().weak_text_color(),
+                    };
+                    let text = format!("{:9.3}  {}", line.seconds, line.text);
+                    let label = egui::Label::new(RichText::new(text).monospace().color(color)).extend();
+                    ui.add(label).on_hover_text(&line.target);
+                }
+            });
+        },
+    );
 }

@@ -48,7 +48,9 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// Corners on whole device pixels, so that one texel is one pixel.
 fn snapped(rect: Rect, pixels_per_point: f32) -> Rect {
-    let snap = |p: Pos2| Pos2::new((p.x * pixels_per_point).round(), (p.y * pixels_per_point).round()) / pixels_per_point;
+    let snap = |p: Pos2| {
+        Pos2::new((p.x * pixels_per_point).round(), (p.y * pixels_per_point).round()) / pixels_per_point
+    };
     Rect::from_min_max(snap(rect.min), snap(rect.max))
 }
 
@@ -79,14 +81,21 @@ fn gizmo_frame(cx: &Cx<'_>, view: &ViewProjection) -> Option<Frame> {
     }
     let document = cx.session.document();
     let tops = cx.state.selection.tops(document);
-    let places: Vec<DVec3> =
-        tops.iter().filter_map(|target| document.world_from(*target)).map(|world| world.translation).collect();
+    let places: Vec<DVec3> = tops
+        .iter()
+        .filter_map(|target| document.world_from(*target))
+        .map(|world| world.translation)
+        .collect();
     let origin = places.iter().sum::<DVec3>() / places.len().max(1) as f64;
     let local = cx.state.space == Space::Local || cx.state.tool == Tool::Scale;
     let axes = match cx.state.selection.active().and_then(|active| document.world_from(active)) {
         Some(world) if local => {
             let m = world.matrix3;
-            [m.x_axis.normalize_or(DVec3::X), m.y_axis.normalize_or(DVec3::Y), m.z_axis.normalize_or(DVec3::Z)]
+            [
+                m.x_axis.normalize_or(DVec3::X),
+                m.y_axis.normalize_or(DVec3::Y),
+                m.z_axis.normalize_or(DVec3::Z),
+            ]
         }
         _ => [DVec3::X, DVec3::Y, DVec3::Z],
     };
@@ -98,8 +107,14 @@ fn paint_gizmo(cx: &Cx<'_>, ui: &Ui, view: &ViewProjection, rect: Rect, frame: O
     let drag = cx.state.view.drag.as_ref();
     let active: Option<Handle> = drag.map(|drag| drag.drag.handle).or(cx.state.view.hovered);
     let painter = ui.painter_at(rect);
-    let picture =
-        GizmoPicture { tool: cx.state.tool, frame: &frame, view, origin: rect.min, active, dragging: drag.is_some() };
+    let picture = GizmoPicture {
+        tool: cx.state.tool,
+        frame: &frame,
+        view,
+        origin: rect.min,
+        active,
+        dragging: drag.is_some(),
+    };
     picture.paint(&painter);
     if let Some(motion) = drag.and_then(|drag| drag.motion)
         && let Some(pointer) = ui.ctx().pointer_latest_pos()
@@ -111,8 +126,10 @@ fn paint_gizmo(cx: &Cx<'_>, ui: &Ui, view: &ViewProjection, rect: Rect, frame: O
 /// Draws a mark for each light and camera; gives the one under the pointer.
 fn marks(cx: &Cx<'_>, ui: &Ui, view: &ViewProjection, rect: Rect) -> Option<Target> {
     let document = cx.session.document();
-    let lights = document.lights().map(|light| (light.target, light.world_from_node.translation, light.visible));
-    let cameras = document.cameras().map(|camera| (camera.target, camera.world_from_node.translation, camera.visible));
+    let lights =
+        document.lights().map(|light| (light.target, light.world_from_node.translation, light.visible));
+    let cameras =
+        document.cameras().map(|camera| (camera.target, camera.world_from_node.translation, camera.visible));
     let pointer = ui.ctx().pointer_hover_pos();
     let painter = ui.painter_at(rect);
     let mut under_pointer = None;
@@ -148,7 +165,13 @@ fn marks(cx: &Cx<'_>, ui: &Ui, view: &ViewProjection, rect: Rect) -> Option<Targ
 }
 
 /// The small cross in the corner that shows the world's axes; gives the view whose end was clicked.
-fn axis_cross(cx: &Cx<'_>, ui: &Ui, view: &ViewProjection, rect: Rect, response: &Response) -> Option<AxisView> {
+fn axis_cross(
+    cx: &Cx<'_>,
+    ui: &Ui,
+    view: &ViewProjection,
+    rect: Rect,
+    response: &Response,
+) -> Option<AxisView> {
     const ARM: f32 = 26.0;
     if rect.width() < 220.0 || rect.height() < 160.0 {
         return None;

@@ -32,7 +32,8 @@ pub fn camera(cx: &mut Cx<'_>, ui: &Ui, response: &Response) {
     let (modifiers, delta) = ui.input(|input| (input.modifiers, input.pointer.delta()));
     let (dx, dy) = (f64::from(delta.x), f64::from(delta.y));
     let middle = response.dragged_by(PointerButton::Middle);
-    let alt_left = modifiers.alt && response.dragged_by(PointerButton::Primary) && cx.state.view.drag.is_none();
+    let alt_left =
+        modifiers.alt && response.dragged_by(PointerButton::Primary) && cx.state.view.drag.is_none();
     cx.state.view.navigating = middle || alt_left;
     if middle && modifiers.shift {
         let metres = super::view::projection(cx).metres_per_point(pose.pivot(cx.state.view.distance_m));
@@ -65,7 +66,7 @@ fn dolly(cx: &mut Cx<'_>, pose: Pose, factor: f64) -> Pose {
     if let caustica_scene::Projection::Orthographic { ymag_m } = cx.session.camera().projection {
         let ymag_m = (f64::from(ymag_m) * factor).clamp(1e-5, 1e7) as f32;
         let projection = caustica_scene::Projection::Orthographic { ymag_m };
-        let camera = ViewCamera { projection, ..cx.session.camera().clone() };
+        let camera = ViewCamera { projection, ..*cx.session.camera() };
         cx.session.set_camera(camera);
     }
     pose
@@ -76,9 +77,16 @@ fn fly(cx: &mut Cx<'_>, ui: &Ui, response: &Response, pose: Pose, delta: DVec2) 
     let held = response.is_pointer_button_down_on() && ui.input(|input| input.pointer.secondary_down());
     let dragged = response.dragged_by(PointerButton::Secondary);
     let (keys, fast, seconds, wheel) = ui.input(|input| {
-        let down = |key: Key, other: Key| f64::from(u8::from(input.key_down(key))) - f64::from(u8::from(input.key_down(other)));
+        let down = |key: Key, other: Key| {
+            f64::from(u8::from(input.key_down(key))) - f64::from(u8::from(input.key_down(other)))
+        };
         let along = DVec3::new(down(Key::D, Key::A), down(Key::E, Key::Q), down(Key::W, Key::S));
-        (along, input.modifiers.shift, f64::from(input.stable_dt).min(0.1), f64::from(input.smooth_scroll_delta().y))
+        (
+            along,
+            input.modifiers.shift,
+            f64::from(input.stable_dt).min(0.1),
+            f64::from(input.smooth_scroll_delta().y),
+        )
     });
     let moving = held && keys != DVec3::ZERO;
     // A right click without a move opens the menu: flying begins with the first move or key.
@@ -88,7 +96,8 @@ fn fly(cx: &mut Cx<'_>, ui: &Ui, response: &Response, pose: Pose, delta: DVec2) 
     }
     let speed = &mut cx.state.view.fly_speed_m_s;
     *speed = (*speed * (wheel * 0.004).exp()).clamp(1e-4, 1e6);
-    let pose = if dragged { pose.look(-delta.x * LOOK_RAD_PER_POINT, -delta.y * LOOK_RAD_PER_POINT) } else { pose };
+    let pose =
+        if dragged { pose.look(-delta.x * LOOK_RAD_PER_POINT, -delta.y * LOOK_RAD_PER_POINT) } else { pose };
     if !moving {
         return pose;
     }

@@ -65,7 +65,8 @@ pub fn default_layout() -> DockState<Tab> {
     let tree = dock.main_surface_mut();
     let [rest, _right] = tree.split_right(NodeIndex::root(), 0.78, vec![Tab::Inspector, Tab::Render]);
     let [rest, _left] = tree.split_left(rest, 0.22, vec![Tab::Outliner]);
-    let [_view, _below] = tree.split_below(rest, 0.76, vec![Tab::Passes, Tab::LeftOut, Tab::Health, Tab::Log]);
+    let [_view, _below] =
+        tree.split_below(rest, 0.76, vec![Tab::Passes, Tab::LeftOut, Tab::Health, Tab::Log]);
     dock
 }
 
@@ -123,7 +124,8 @@ impl Config {
         let mut config: Self = serde_json::from_value(value)?;
         // A layout without a view is of no use.
         config.layout = config.layout.filter(|dock| dock.iter_all_tabs().any(|(_, tab)| *tab == Tab::View));
-        config.window = config.window.map(|side| if side.is_finite() { side.clamp(480.0, 16_384.0) } else { 960.0 });
+        config.window =
+            config.window.map(|side| if side.is_finite() { side.clamp(480.0, 16_384.0) } else { 960.0 });
         config.recent.truncate(MOST_RECENT);
         Ok(config)
     }

@@ -58,7 +58,8 @@ mod tests {
         for x in (-180..=180).step_by(30) {
             for y in (-90..=90).step_by(15) {
                 for z in (-180..=180).step_by(45) {
-                    let rotation = rotation_from_degrees(DVec3::new(f64::from(x), f64::from(y), f64::from(z)));
+                    let rotation =
+                        rotation_from_degrees(DVec3::new(f64::from(x), f64::from(y), f64::from(z)));
                     let again = rotation_from_degrees(degrees_from_rotation(rotation));
                     assert!(again.dot(rotation).abs() > 1.0 - 1e-9, "{x} {y} {z}");
                 }

@@ -54,7 +54,8 @@ impl OutlinerState {
 
     /// Opens everything above a target and scrolls to it.
     pub fn reveal(&mut self, document: &Document, target: Target) {
-        let above: Vec<_> = std::iter::successors(document.parent_of(target), |&t| document.parent_of(t)).collect();
+        let above: Vec<_> =
+            std::iter::successors(document.parent_of(target), |&t| document.parent_of(t)).collect();
         for target in above {
             self.set_open(target, true);
         }
@@ -86,7 +87,8 @@ impl OutlinerState {
 /// The tree in order, without what lies below closed rows. Iterative: a deep tree does not end the program.
 fn flatten(document: &Document, is_open: impl Fn(Target) -> bool) -> Vec<Row> {
     let mut rows = Vec::new();
-    let mut stack: Vec<(Target, u16)> = document.roots().iter().rev().map(|id| (Target::node(*id), 0)).collect();
+    let mut stack: Vec<(Target, u16)> =
+        document.roots().iter().rev().map(|id| (Target::node(*id), 0)).collect();
     while let Some((target, depth)) = stack.pop() {
         let children = document.children_of(target);
         rows.push(Row { target, depth, has_children: !children.is_empty() });

@@ -26,6 +26,7 @@ struct Slot {
     value: u64,
     staging: Option<Staging>,
     timers: Option<Timers>,
+    tag: u64,
 }
 
 /// What a finished frame tells.
@@ -33,6 +34,8 @@ struct Slot {
 pub struct FrameResult {
     /// Milliseconds of each pass, in order of their first use.
     pub passes: Vec<PassTime>,
+    /// What the recorder was tagged with; 0: nothing.
+    pub tag: u64,
 }
 
 /// The ring of frames in flight.
@@ -65,6 +68,7 @@ impl Frames {
     pub fn begin(&mut self) -> Result<Recorder> {
         let index = self.next;
         let device = Arc::clone(&self.device);
+        self.finished = FrameResult::default();
         self.finish_slot(index)?;
         let slot = &mut self.slots[index];
         let mut staging = slot.staging.take().unwrap_or_else(|| Staging::new(&device));
@@ -93,6 +97,7 @@ impl Frames {
     /// # Errors
     /// [`GpuError::DeviceLost`] and other refusals of the driver.
     pub fn submit(&mut self, recorder: Recorder, window: Option<&Acquired>) -> Result<u64> {
+        let tag = recorder.tag();
         let (command, index, staging, timers) = recorder.finish()?;
         let device = &self.device;
         let value = device.submitted.load(Ordering::Acquire) + 1;
@@ -123,6 +128,7 @@ impl Frames {
         let slot = &mut self.slots[index];
         slot.staging = Some(staging);
         slot.timers = Some(timers);
+        slot.tag = tag;
         let queue = device.queue.lock().map_err(|_| lost("unknown", "submission"))?;
         // SAFETY: the queue is locked, the command buffer is complete, the semaphores are alive.
         let submitted = unsafe { device.raw.queue_submit2(*queue, &info, vk::Fence::null()) };
@@ -171,7 +177,7 @@ impl Frames {
         if let Some(timers) = &self.slots[index].timers {
             let passes = timers.read();
             if !passes.is_empty() {
-                self.finished = FrameResult { passes };
+                self.finished = FrameResult { passes, tag: self.slots[index].tag };
             }
         }
         Ok(())
@@ -213,5 +219,5 @@ fn create_slot(device: &Arc<Device>) -> Result<Slot> {
     // SAFETY: the pool is alive; the buffer dies with it.
     let command =
         unsafe { device.raw.allocate_command_buffers(&info) }.during("vkAllocateCommandBuffers")?[0];
-    Ok(Slot { pool, command, value: 0, staging: None, timers: None })
+    Ok(Slot { pool, command, value: 0, staging: None, timers: None, tag: 0 })
 }

@@ -60,7 +60,7 @@ pub struct Recorder {
     command: vk::CommandBuffer,
     slot: usize,
     parts: Option<(Staging, Timers)>,
-    tracing: Option<String>,
+    tag: u64,
 }
 
 impl Recorder {
@@ -71,7 +71,7 @@ impl Recorder {
         staging: Staging,
         timers: Timers,
     ) -> Self {
-        Self { device, command, slot, parts: Some((staging, timers)), tracing: None }
+        Self { device, command, slot, parts: Some((staging, timers)), tag: 0 }
     }
 
     pub(crate) fn finish(mut self) -> Result<(vk::CommandBuffer, usize, Staging, Timers)> {
@@ -86,6 +86,15 @@ impl Recorder {
     /// Which of the frames in flight this is, below `Frames::in_flight()`.
     pub fn slot(&self) -> usize {
         self.slot
+    }
+
+    /// Marks the frame; its times come back with this number.
+    pub fn set_tag(&mut self, tag: u64) {
+        self.tag = tag;
+    }
+
+    pub(crate) fn tag(&self) -> u64 {
+        self.tag
     }
 
     /// The device.
@@ -115,7 +124,6 @@ impl Recorder {
         if let Some((_, timers)) = &mut self.parts {
             timers.begin(self.command, label);
         }
-        self.tracing = Some(label.to_owned());
         let name = std::ffi::CString::new(label).unwrap_or_default();
         if let Some(debug) = &self.device.debug_utils {
             let info = vk::DebugUtilsLabelEXT::default().label_name(&name);

@@ -58,7 +58,7 @@ impl GBuffer {
                     // Never written without emission, but something of the kind has to be bound.
                     ("gbuffer_emissive", Bind::Image(targets.emissive.as_ref().unwrap_or(&targets.shaded))),
                 ];
-                scope.rays(recorder, "gbuffer.trace", trace, &binds, 1)
+                scope.rays(recorder, "gbuffer.trace", trace, &binds, 0..scope.extent[1], 1)
             }
             Self::Raster { opaque, alpha } => {
                 let mut colors: Vec<&Image> =
@@ -100,7 +100,7 @@ fn draw(
     depth: &Image,
 ) -> Result<()> {
     let batches = scope.tables.draws.batches();
-    let pushes: Vec<Push> = batches.iter().map(|batch| scope.push(batch.key.geometry)).collect();
+    let pushes: Vec<Push> = batches.iter().map(|batch| scope.push(batch.key.geometry, 0)).collect();
     let mut solid = Vec::new();
     let mut holes = Vec::new();
     for (batch, push) in batches.iter().zip(&pushes) {

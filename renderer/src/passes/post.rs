@@ -25,18 +25,19 @@ impl Post {
         })
     }
 
-    /// Fills `display`, and `window` where the view has one.
+    /// Fills `display`, and `window` where the view has one. `parity` and `filled`: which normal and depth images, and
+    /// which history images, are this frame's.
     pub(crate) fn record(
         &self,
         recorder: &mut Recorder,
         scope: &Scope<'_>,
         targets: &Targets,
-        parity: usize,
+        (parity, filled): (usize, usize),
         accumulator: &Buffer,
         show: Show,
     ) -> Result<()> {
         let unused = scope.tables.textures.white();
-        match shown(show, targets, parity) {
+        match shown(show, targets, parity, filled) {
             None => {
                 let uses = [Use::Buffer(accumulator, Stage::Compute, Access::StorageRead)];
                 let binds =
@@ -75,7 +76,7 @@ enum Source<'a> {
 }
 
 /// What `show.comp` is told, and the image it reads.
-fn shown<'a>(show: Show, targets: &'a Targets, parity: usize) -> Option<(u32, Source<'a>)> {
+fn shown<'a>(show: Show, targets: &'a Targets, parity: usize, filled: usize) -> Option<(u32, Source<'a>)> {
     let normal = &targets.normal[parity % targets.normal.len()];
     let depth = &targets.depth[parity % targets.depth.len()];
     let history = targets.history.as_ref();
@@ -95,7 +96,7 @@ fn shown<'a>(show: Show, targets: &'a Targets, parity: usize) -> Option<(u32, So
         Show::DirectDiffuse => (constants::SHOW_LIGHT, Source::Float(targets.direct_diffuse.as_ref())),
         Show::DirectSpecular => (constants::SHOW_LIGHT, Source::Float(targets.direct_specular.as_ref())),
         Show::History => {
-            (constants::SHOW_HISTORY, Source::Float(history.map(|history| &history.diffuse[parity % 2])))
+            (constants::SHOW_HISTORY, Source::Float(history.map(|history| &history.diffuse[filled])))
         }
     })
 }

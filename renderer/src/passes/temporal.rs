@@ -17,13 +17,14 @@ impl Temporal {
         Ok(Self { pipeline: builder.compute("temporal", "passes/temporal/temporal.comp")? })
     }
 
-    /// Fills the history images of this parity from those of the other.
+    /// Fills the history images `filled` from the other ones; `parity`: the normal and depth images of this frame.
     pub(crate) fn record(
         &self,
         recorder: &mut Recorder,
         scope: &Scope<'_>,
         targets: &Targets,
         parity: usize,
+        filled: usize,
     ) -> Result<()> {
         let (Some(history), Some(diffuse), Some(specular)) =
             (&targets.history, &targets.direct_diffuse, &targets.direct_specular)
@@ -40,10 +41,10 @@ impl Temporal {
             ("direct_specular", Bind::Image(specular)),
             ("previous_depth", Bind::Image(&targets.depth[past])),
             ("previous_normal", Bind::Image(&targets.normal[past])),
-            ("previous_diffuse", Bind::Image(&history.diffuse[past])),
-            ("previous_specular", Bind::Image(&history.specular[past])),
-            ("history_diffuse", Bind::Image(&history.diffuse[now])),
-            ("history_specular", Bind::Image(&history.specular[now])),
+            ("previous_diffuse", Bind::Image(&history.diffuse[1 - filled])),
+            ("previous_specular", Bind::Image(&history.specular[1 - filled])),
+            ("history_diffuse", Bind::Image(&history.diffuse[filled])),
+            ("history_specular", Bind::Image(&history.specular[filled])),
         ];
         scope.compute(recorder, "temporal", &self.pipeline, &binds, &[], 0)
     }

@@ -35,6 +35,8 @@ const SLOW_MS: f64 = 80.0;
 /// Longest time without a new picture while there is input.
 const PICTURE_AT_LEAST_EVERY: Duration = Duration::from_millis(250);
 
+/// Label of the pass that draws the panels.
+const UI_PASS: &str = "ui";
 /// How often a slow device is asked whether it has finished.
 const DEVICE_POLL: Duration = Duration::from_millis(4);
 
@@ -77,6 +79,12 @@ pub(super) struct EditorWindow {
     must_resize: bool,
     occluded: bool,
     redraw_at: Option<Instant>,
+    /// When the panels want to be drawn again, as for an animation.
+    panels_due: Option<Instant>,
+    /// The next frame only carries on with the picture: nothing new is to be shown yet.
+    silent: bool,
+    /// Samples of the picture at the last frame.
+    samples: u64,
     /// The next picture waits until the device has finished this one.
     waits_for_device: bool,
     title: String,
@@ -151,6 +159,9 @@ impl EditorWindow {
             must_resize: false,
             occluded: false,
             redraw_at: None,
+            panels_due: None,
+            silent: false,
+            samples: 0,
             waits_for_device: false,
             title: String::new(),
             device,
@@ -160,6 +171,12 @@ impl EditorWindow {
 
     /// Draws a frame soon.
     pub(super) fn request_redraw(&mut self) {
+        self.silent = false;
+        self.carry_on();
+    }
+
+    /// Draws a frame soon; a silent one stays silent.
+    fn carry_on(&mut self) {
         self.redraw_at = None;
         self.waits_for_device = false;
         self.window.request_redraw();
@@ -170,6 +187,8 @@ impl EditorWindow {
         // A lost device shows itself in the next frame.
         if self.waits_for_device && self.device.has_finished().is_ok_and(|finished| !finished) {
             self.redraw_at = Instant::now().checked_add(DEVICE_POLL);
+        } else if self.silent && self.panels_due.is_none_or(|due| Instant::now() < due) {
+            self.carry_on();
         } else {
             self.request_redraw();
         }
@@ -197,7 +216,11 @@ impl EditorWindow {
     /// Takes in one event.
     pub(super) fn event(&mut self, event: WindowEvent) -> anyhow::Result<Next> {
         if matches!(event, WindowEvent::RedrawRequested) {
-            self.frame()?;
+            if self.silent && !self.must_resize && self.panels_due.is_none_or(|due| Instant::now() < due) {
+                self.silent_frame()?;
+            } else {
+                self.frame()?;
+            }
             return Ok(if self.editor.should_quit() { Next::Quit } else { Next::GoOn });
         }
         let response = self.input.on_window_event(&self.window, &event);
@@ -224,6 +247,7 @@ impl EditorWindow {
     }
 
     fn frame(&mut self) -> anyhow::Result<()> {
+        self.silent = false;
         if self.must_resize {
             self.resize()?;
         }
@@ -328,7 +352,8 @@ impl EditorWindow {
             self.interval_ms += (interval_ms - self.interval_ms) * 0.3;
         }
         self.last_picture = now;
-        let ms: f64 = self.editor.session.statistics().passes.iter().map(|(_, ms)| ms).sum();
+        let passes = self.editor.session.statistics().passes.iter();
+        let ms: f64 = passes.filter(|(label, _)| label != UI_PASS).map(|(_, ms)| ms).sum();
         self.adaptive.measured(ms);
     }
 
@@ -365,7 +390,7 @@ impl EditorWindow {
         let extent = self.swapchain.extent();
         let (swapchain, ui) = (&self.swapchain, &mut self.ui);
         let mut drawn = Ok(());
-        recorder.pass("ui", |recorder| {
+        recorder.pass(UI_PASS, |recorder| {
             swapchain.begin_rendering(recorder, &acquired, clear);
             drawn = ui.draw(recorder, extent, points, primitives);
             swapchain.end_rendering(recorder, &acquired);
@@ -385,23 +410,62 @@ impl EditorWindow {
         }
     }
 
+    /// Goes on with a picture that takes several submits, without drawing the panels: nothing they show has changed.
+    fn silent_frame(&mut self) -> anyhow::Result<()> {
+        let Some(full) = self.editor.state.view.extent_px else {
+            self.request_redraw();
+            return Ok(());
+        };
+        match self.editor.session.begin_frame(full) {
+            Ok(recorder) => self.editor.session.submit(recorder, None)?,
+            Err(error) if is_fatal(&error) => return Err(error),
+            Err(error) => {
+                // The next whole frame meets the same error and shows it.
+                tracing::debug!("{error:#}");
+                self.request_redraw();
+                return Ok(());
+            }
+        }
+        self.note_times();
+        if self.editor.session.samples() == self.samples {
+            self.go_on_soon();
+        } else {
+            self.request_redraw();
+        }
+        Ok(())
+    }
+
     fn plan_next(&mut self, repaint_delay: Duration) {
         let full = self.editor.state.view.extent_px;
+        let fresh = full.is_some_and(|full| self.shown.as_ref() == Some(&self.key(full)));
+        let whole = self.editor.state.view.divisor == 1;
         let unfinished = full.is_some_and(|full| {
-            let key = self.key(full);
-            let fresh = self.shown.as_ref() == Some(&key) && self.editor.state.view.divisor == 1;
-            self.broken.as_ref() != Some(&key) && !(fresh && self.editor.session.is_converged())
+            self.broken.as_ref() != Some(&self.key(full)) && !(fresh && whole && self.editor.session.is_converged())
         });
+        let samples = self.editor.session.samples();
+        let nothing_new = samples == self.samples;
+        self.samples = samples;
+        self.panels_due = Instant::now().checked_add(repaint_delay);
         let goes_on = unfinished && !self.occluded;
         self.continuous &= goes_on;
-        if goes_on && self.is_slow() && !repaint_delay.is_zero() {
-            // Never two slow pictures in a row on the queue: panels that react to input would wait for both.
-            self.waits_for_device = true;
-            self.redraw_at = Instant::now().checked_add(DEVICE_POLL);
+        if goes_on && !repaint_delay.is_zero() {
+            self.silent = fresh && whole && nothing_new;
+            self.go_on_soon();
         } else if goes_on || repaint_delay.is_zero() {
             self.request_redraw();
         } else {
-            self.redraw_at = Instant::now().checked_add(repaint_delay);
+            self.redraw_at = self.panels_due;
+        }
+    }
+
+    /// The next picture: at once, or when a slow device has finished this one.
+    fn go_on_soon(&mut self) {
+        if self.is_slow() {
+            // Never two slow pictures in a row on the queue: panels that react to input would wait for both.
+            self.waits_for_device = true;
+            self.redraw_at = Instant::now().checked_add(DEVICE_POLL);
+        } else {
+            self.carry_on();
         }
     }
 }

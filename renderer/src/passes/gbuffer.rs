@@ -1,9 +1,9 @@
 //! Pass `gbuffer`: what is seen through every pixel. Enters: instances, materials. Leaves: ids, normals, material,
-//! motion, depth. By raster, or by rays with the same result.
+//! motion, depth. By raster (ids first, then resolved once a pixel) or by rays, with the same result.
 
 use caustica_gpu::{
-    Bind, ColorTarget, Draw, Format, GraphicsDesc, GraphicsPipeline, Image, RayTracingPipeline, Recorder,
-    Stage,
+    Bind, ColorTarget, ComputePipeline, Draw, Format, GraphicsDesc, GraphicsPipeline, Image, RayTracingPipeline,
+    Recorder, Stage,
 };
 
 use super::{Builder, Scope};
@@ -16,7 +16,7 @@ use crate::view::Targets;
 
 /// The pass.
 pub(crate) enum GBuffer {
-    Raster { opaque: GraphicsPipeline, alpha: Option<GraphicsPipeline> },
+    Raster { opaque: GraphicsPipeline, alpha: Option<GraphicsPipeline>, resolve: ComputePipeline },
     Rays { trace: RayTracingPipeline },
 }
 
@@ -25,15 +25,14 @@ impl GBuffer {
         if pipeline == Pipeline::Raytraced {
             return Ok(Self::Rays { trace: builder.rays("gbuffer.trace", "passes/gbuffer/gbuffer.rgen")? });
         }
-        let emission = if builder.needs.emission { "_emissive" } else { "" };
-        let opaque = raster(builder, "gbuffer.raster", &format!("passes/gbuffer/gbuffer{emission}.frag"))?;
-        let alpha = if builder.needs.alpha {
-            let file = format!("passes/gbuffer/gbuffer_alpha{emission}.frag");
-            Some(raster(builder, "gbuffer.raster alpha", &file)?)
-        } else {
-            None
-        };
-        Ok(Self::Raster { opaque, alpha })
+        let alpha = builder.needs.alpha;
+        Ok(Self::Raster {
+            opaque: raster(builder, "gbuffer.raster", "passes/gbuffer/visibility.frag")?,
+            alpha: alpha
+                .then(|| raster(builder, "gbuffer.raster alpha", "passes/gbuffer/visibility_alpha.frag"))
+                .transpose()?,
+            resolve: builder.compute("gbuffer.resolve", "passes/gbuffer/resolve.comp")?,
+        })
     }
 
     /// Fills the G-buffer; `parity` chooses among the two normal and depth images.
@@ -44,48 +43,38 @@ impl GBuffer {
         targets: &Targets,
         parity: usize,
     ) -> Result<()> {
-        let normal = &targets.normal[parity % targets.normal.len()];
         let depth = &targets.depth[parity % targets.depth.len()];
+        let binds = [
+            ("gbuffer_id", Bind::Image(&targets.id)),
+            ("gbuffer_normal", Bind::Image(&targets.normal[parity % targets.normal.len()])),
+            ("gbuffer_base_color", Bind::Image(&targets.base_color)),
+            ("gbuffer_material", Bind::Image(&targets.material)),
+            ("gbuffer_motion", Bind::Image(&targets.motion)),
+            ("gbuffer_depth", Bind::Image(depth)),
+            // Never written without emission, but something of the kind has to be bound.
+            ("gbuffer_emissive", Bind::Image(targets.emissive.as_ref().unwrap_or(&targets.shaded))),
+        ];
         match self {
             Self::Rays { trace } => {
-                let binds = [
-                    ("gbuffer_id", Bind::Image(&targets.id)),
-                    ("gbuffer_normal", Bind::Image(normal)),
-                    ("gbuffer_base_color", Bind::Image(&targets.base_color)),
-                    ("gbuffer_material", Bind::Image(&targets.material)),
-                    ("gbuffer_motion", Bind::Image(&targets.motion)),
-                    ("gbuffer_depth", Bind::Image(depth)),
-                    // Never written without emission, but something of the kind has to be bound.
-                    ("gbuffer_emissive", Bind::Image(targets.emissive.as_ref().unwrap_or(&targets.shaded))),
-                ];
                 scope.rays(recorder, "gbuffer.trace", trace, &binds, 0..scope.extent[1], 1)
             }
-            Self::Raster { opaque, alpha } => {
-                let mut colors: Vec<&Image> =
-                    vec![&targets.id, normal, &targets.base_color, &targets.material, &targets.motion];
-                colors.extend(targets.emissive.as_ref());
-                draw(recorder, scope, opaque, alpha.as_ref(), &colors, depth)
+            Self::Raster { opaque, alpha, resolve } => {
+                draw(recorder, scope, opaque, alpha.as_ref(), &targets.id, depth)?;
+                scope.compute(recorder, "gbuffer.resolve", resolve, &binds, &[], 0)
             }
         }
     }
 }
 
 fn raster(builder: &mut Builder<'_>, label: &str, fragment_file: &str) -> Result<GraphicsPipeline> {
-    let vertex = builder.library.stage("passes/gbuffer/gbuffer.vert")?;
+    let vertex = builder.library.stage("passes/gbuffer/visibility.vert")?;
     let fragment = builder.library.stage(fragment_file)?;
     let interface = merge_interfaces(&[&vertex, &fragment])?;
-    let mut colors: Vec<ColorTarget> =
-        [Format::Rgba32Uint, Format::Rg32Uint, Format::Rgba16Float, Format::Rg16Float, Format::Rg32Float]
-            .map(|format| ColorTarget { format })
-            .to_vec();
-    if builder.needs.emission {
-        colors.push(ColorTarget { format: Format::Rgba32Float });
-    }
     let desc = GraphicsDesc {
         name: label,
         vertex: &vertex.module,
         fragment: &fragment.module,
-        colors: &colors,
+        colors: &[ColorTarget { format: Format::Rgba32Uint }],
         depth: Some(Format::Depth32),
     };
     Ok(GraphicsPipeline::new(builder.device, &desc, &interface, &builder.specialization, Some(builder.set))?)
@@ -96,7 +85,7 @@ fn draw(
     scope: &Scope<'_>,
     opaque: &GraphicsPipeline,
     alpha: Option<&GraphicsPipeline>,
-    colors: &[&Image],
+    id: &Image,
     depth: &Image,
 ) -> Result<()> {
     let batches = scope.tables.draws.batches();
@@ -113,7 +102,7 @@ fn draw(
     }
     let uses = scope.tables.uses(Stage::Raster);
     recorder.pass("gbuffer.raster", |recorder| {
-        recorder.draw(&pipelines, Some(scope.set), &[], &uses, colors, Some(depth), scope.extent)
+        recorder.draw(&pipelines, Some(scope.set), &[], &uses, &[id], Some(depth), scope.extent)
     })?;
     Ok(())
 }

@@ -194,6 +194,8 @@ pub struct ViewState {
     pub fly_speed_m_s: f64,
     /// A mouse button moves the camera now.
     pub navigating: bool,
+    /// Lights and cameras, and the `History::structure_revision` that they were collected at.
+    pub marked: Option<(u64, Vec<Target>)>,
 }
 
 impl Default for ViewState {
@@ -208,6 +210,7 @@ impl Default for ViewState {
             flying: false,
             fly_speed_m_s: 2.0,
             navigating: false,
+            marked: None,
         }
     }
 }
@@ -283,8 +286,6 @@ pub struct UiState {
     pub health: Option<Health>,
     /// Smoothed milliseconds of each pass.
     pub pass_ms: BTreeMap<String, f64>,
-    /// Pixels in the window per point.
-    pub pixels_per_point: f32,
 }
 
 #[cfg(test)]

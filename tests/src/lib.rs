@@ -17,7 +17,8 @@ pub fn repository() -> PathBuf {
     tests.parent().map_or_else(|| tests.clone(), PathBuf::from)
 }
 
-/// The folder of the shaders, read fresh, not the copy in the binary.
+/// The folder of the shaders, read fresh, not the copy in the binary. `CAUSTICA_TEST_SHADERS` names another one: with a
+/// fault planted in it, the tests must fail.
 pub fn shader_folder() -> PathBuf {
-    repository().join("shaders")
+    std::env::var_os("CAUSTICA_TEST_SHADERS").map_or_else(|| repository().join("shaders"), PathBuf::from)
 }

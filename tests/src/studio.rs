@@ -99,13 +99,26 @@ impl Studio {
         }
     }
 
-    /// Renders `samples` samples and reads their mean.
+    /// Renders at least one frame, and more until `samples` samples are accumulated; reads their mean.
     ///
     /// # Panics
     /// When the device fails.
-    pub fn mean(&mut self, samples: u32) -> Accumulated {
-        self.frames(samples);
+    pub fn mean(&mut self, samples: u64) -> Accumulated {
+        self.frames(1);
+        while self.view().samples() < samples {
+            self.frames(1);
+        }
         self.read()
+    }
+
+    /// Shows another scene whose ids are those of the one before, or some of them: pipelines stay, which is faster
+    /// than a new studio.
+    ///
+    /// # Panics
+    /// When the device fails.
+    pub fn restage(&mut self, scene: &SceneDelta, camera: Camera) {
+        self.view_mut().set_camera(camera);
+        self.apply(scene);
     }
 
     /// Reads the mean of what was rendered.

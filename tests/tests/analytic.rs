@@ -131,16 +131,22 @@ fn a_hard_shadow_ends_at_its_exact_pixel() {
     let pixel_m = 2.0 / 8.0;
     // The edge passes a thousandth of a pixel beside the centre of pixel 40.
     let centre_m = (40.5 / 8.0 * 2.0 - 8.0) as f32;
+    let camera = camera_parallel(0.5, 1.0);
+    let mut studio = Studio::of(extent, still(Pipeline::Hybrid), &shadow_scene(0.0, 0.0).delta, camera);
     for pipeline in [Pipeline::Hybrid, Pipeline::Raytraced] {
+        studio.set(|settings| settings.pipeline = pipeline);
         for (offset, first_lit) in [(-1e-3, 40), (1e-3, 41)] {
-            let scene = shadow_scene(centre_m + offset * pixel_m, 0.0);
-            let image = Studio::of(extent, still(pipeline), &scene.delta, camera_parallel(0.5, 1.0)).mean(2);
+            studio.restage(&shadow_scene(centre_m + offset * pixel_m, 0.0).delta, camera);
+            let image = studio.mean(2);
             let lit = 1.0 / PI / 1.25_f64.sqrt();
             for (x, y) in pixels(extent) {
-                // The wall's other end lies to the left of the image.
                 let expected = if x < first_lit { 0.0 } else { lit };
                 let found = red(&image, x, y);
-                assert!((found - expected).abs() < 1e-4, "{} {offset} at {x}, {y}: {found}", pipeline.name());
+                assert!(
+                    (found - expected).abs() < 6e-4 * lit,
+                    "{} {offset} at {x}, {y}: {found}",
+                    pipeline.name()
+                );
             }
         }
     }
@@ -311,8 +317,7 @@ fn middle(image: &Accumulated) -> f64 {
 
 #[test]
 fn nothing_is_lost_or_gained_in_a_furnace() {
-    let extent = [48, 48];
-    let deep = |pipeline| ViewSettings { max_depth: 64, ..still(pipeline) };
+    let extent = [32, 32];
     let smooth_metal = Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
     let clear_plastic = Material {
         transmission: 1.0,
@@ -331,16 +336,22 @@ fn nothing_is_lost_or_gained_in_a_furnace() {
         ("thin glass", sheet, 128),
         ("clear plastic", clear_plastic, 128),
     ];
+    let scene_of = |material: &Material| {
+        let mut scene = Scene::new();
+        scene.put(sphere(1.0, 128), material.clone(), Affine3A::IDENTITY);
+        scene.surround(1.0);
+        scene
+    };
+    let camera = camera_at(Vec3::new(0.0, 0.0, 5.0), Vec3::ZERO, 0.5);
+    let settings = ViewSettings { max_depth: 64, ..still(Pipeline::Hybrid) };
+    let mut studio = Studio::of(extent, settings, &scene_of(&lambert(1.0)).delta, camera);
     for pipeline in [Pipeline::Hybrid, Pipeline::Raytraced] {
+        studio.set(|settings| settings.pipeline = pipeline);
         for (name, material, samples) in &cases {
-            let mut scene = Scene::new();
-            scene.put(sphere(1.0, 128), material.clone(), Affine3A::IDENTITY);
-            scene.surround(1.0);
-            let camera = camera_at(Vec3::new(0.0, 0.0, 5.0), Vec3::ZERO, 0.5);
-            let mut studio = Studio::of(extent, deep(pipeline), &scene.delta, camera);
+            studio.restage(&scene_of(material).delta, camera);
             let mean = middle(&studio.mean(*samples));
             // Schlick's share going in and the exact one going out do not quite add up (glTF's model, not the path's).
-            let bound = if *name == "clear plastic" { 0.02 } else { 1e-3 };
+            let bound = if *name == "clear plastic" { 0.02 } else { 1.2e-3 };
             assert!((mean - 1.0).abs() < bound, "{name}, {}: {mean}", pipeline.name());
             assert_eq!(studio.statistics().non_finite, 0);
         }
@@ -366,21 +377,22 @@ fn scaled(scale: f32) -> (Scene, caustica_renderer::delta::Camera) {
 #[test]
 fn a_scene_looks_the_same_at_every_scale() {
     let extent = [64, 48];
+    let (scene, camera) = scaled(1.0);
+    let mut studio = Studio::of(extent, still(Pipeline::Hybrid), &scene.delta, camera);
     for pipeline in [Pipeline::Hybrid, Pipeline::Raytraced] {
-        let image_at = |scale: f32| {
+        studio.set(|settings| settings.pipeline = pipeline);
+        let mut image_at = |scale: f32| {
             let (scene, camera) = scaled(scale);
-            Studio::of(extent, still(pipeline), &scene.delta, camera).mean(1)
+            studio.restage(&scene.delta, camera);
+            studio.mean(1)
         };
         let expected = image_at(1.0);
         assert!(middle(&expected) > 0.1);
         for scale in [1e-6, 1e-3, 1e3, 1e6] {
             let image = image_at(scale);
-            let differing = pixels(extent)
-                .filter(|(x, y)| {
-                    (red(&image, *x, *y) - red(&expected, *x, *y)).abs()
-                        > 1e-3 * (0.1 + red(&expected, *x, *y))
-                })
-                .count();
+            let far = |found: f64, expected: f64| (found - expected).abs() > 1e-3 * (0.1 + expected);
+            let differing =
+                pixels(extent).filter(|(x, y)| far(red(&image, *x, *y), red(&expected, *x, *y))).count();
             // Only where an edge passes through a pixel's centre.
             assert!(differing <= 6, "{} at scale {scale:e}: {differing} pixels differ", pipeline.name());
         }
@@ -390,29 +402,27 @@ fn a_scene_looks_the_same_at_every_scale() {
 #[test]
 fn nothing_shades_itself_at_grazing_light_and_any_scale() {
     let extent = [64, 64];
+    let mut studio: Option<Studio> = None;
     for scale in [1e-6_f32, 1e-3, 1.0, 1e3, 1e6] {
         for degrees in [45.0_f64, 85.0, 89.0, 89.9] {
             let angle = degrees.to_radians();
-            let direction = DVec3::new(angle.sin() * 0.8, angle.sin() * 0.6, -angle.cos());
-            let light = Light::Directional {
-                direction: direction.as_vec3(),
-                irradiance: Vec3::ONE,
-                angular_radius_rad: 0.0,
-            };
+            let direction = DVec3::new(angle.sin() * 0.8, angle.sin() * 0.6, -angle.cos()).as_vec3();
             let mut scene = Scene::new();
             // Off the origin, and turned out of the axes, so that nothing is exact.
             let turn = Affine3A::from_rotation_z(0.3);
-            let place = Affine3A::from_translation(Vec3::new(3.3, 1.7, -2.1) * scale) * turn;
-            scene.put(quad(8.0, 8.0), lambert(1.0), place * Affine3A::from_scale(Vec3::splat(scale)));
-            scene.light(light);
+            let offset = Affine3A::from_translation(Vec3::new(3.3, 1.7, -2.1) * scale);
+            scene.put(quad(8.0, 8.0), lambert(1.0), offset * turn * Affine3A::from_scale(Vec3::splat(scale)));
+            scene.light(Light::Directional { direction, irradiance: Vec3::ONE, angular_radius_rad: 0.0 });
             let mut camera = camera_parallel(scale, scale);
-            camera.render_from_camera.translation +=
-                Affine3A::from_translation(Vec3::new(3.3, 1.7, -2.1) * scale).translation;
+            camera.render_from_camera = offset * camera.render_from_camera;
             camera.near_m = 0.01 * scale;
-            let image = Studio::of(extent, still(Pipeline::Hybrid), &scene.delta, camera).mean(1);
+            let studio = studio
+                .get_or_insert_with(|| Studio::of(extent, still(Pipeline::Hybrid), &scene.delta, camera));
+            studio.restage(&scene.delta, camera);
+            let image = studio.mean(1);
             let expected = angle.cos() / PI;
-            // The normal's 6.5e-5 rad are a few per cent of the cosine at 89.9 degrees.
-            let bound = expected * (1e-3 + 1e-4 * angle.tan());
+            // The light's direction in single precision alone is worth 6e-8 rad / cos.
+            let bound = expected * (1e-3 + 1e-6 * angle.tan());
             let wrong =
                 pixels(extent).filter(|(x, y)| (red(&image, *x, *y) - expected).abs() > bound).count();
             assert_eq!(wrong, 0, "scale {scale:e}, {degrees} degrees");

@@ -1,8 +1,10 @@
 //! The editor without its window: session, memory, panels and what goes on besides. Enters: egui's frame. Leaves:
 //! drawings and a changed session. It knows no winit and no swapchain, so that it can run in a test.
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
+use caustica_scene::{Finding, audit};
 use egui::{CentralPanel, Context, Frame, Id, Margin, Modal, Panel, Ui, WidgetText};
 use egui_dock::{DockArea, DockState, TabViewer};
 
@@ -12,8 +14,8 @@ use crate::dialogs::Dialogs;
 use crate::panels::{self, Cx, bars, overlays};
 use crate::session::Session;
 use crate::theme;
-use crate::ui_state::{Config, PaletteState, Tab, UiState, default_layout};
-use crate::worker::Wake;
+use crate::ui_state::{Config, Health, PaletteState, Tab, UiState, default_layout};
+use crate::worker::{Answer, Job, Wake};
 
 /// What waits for an answer about unsaved changes.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +39,10 @@ pub struct Editor {
     pub(super) dock: DockState<Tab>,
     pub(super) dialogs: Dialogs,
     pub(super) loading: Option<Loading>,
+    /// Files to import after the present one.
+    pub(super) waiting: VecDeque<PathBuf>,
+    /// The audit that is running, and the state of the document that it looks at.
+    audit: Option<(u64, Job<Vec<Finding>>)>,
     /// The question about unsaved changes, while it is shown.
     pub(super) question: Option<Then>,
     /// To be done once a save has succeeded.
@@ -57,6 +63,8 @@ impl Editor {
             dock,
             dialogs: Dialogs::default(),
             loading: None,
+            waiting: VecDeque::new(),
+            audit: None,
             question: None,
             after_save: None,
             quit: false,
@@ -110,8 +118,8 @@ impl Editor {
     pub fn ui(&mut self, ui: &mut Ui) {
         let context = ui.ctx().clone();
         self.apply_theme(&context);
-        self.state.pixels_per_point = context.pixels_per_point();
         self.poll_loading();
+        self.keep_audited();
         self.take_keys(&context);
         self.take_dropped_files(&context);
         self.bars_and_panels(ui);
@@ -132,6 +140,32 @@ impl Editor {
         if self.theme_set != Some(dark) {
             theme::set_dark(context, dark);
             self.theme_set = Some(dark);
+        }
+    }
+
+    /// Audits the document on a worker whenever it has changed and no drag is going on.
+    fn keep_audited(&mut self) {
+        if let Some((state, job)) = self.audit.take() {
+            match job.poll() {
+                Answer::Running => self.audit = Some((state, job)),
+                Answer::Done(findings) => self.state.health = Some(Health { state, findings }),
+                Answer::Died => {
+                    tracing::error!("the audit failed in a way that was not foreseen");
+                    self.state.health = Some(Health { state, findings: Vec::new() });
+                }
+            }
+        }
+        let history = self.session.history();
+        let state = history.state();
+        let stale = self.state.health.as_ref().is_none_or(|health| health.state != state);
+        if !stale || self.audit.is_some() || history.gesture_is_open() {
+            return;
+        }
+        // Vertices and texels are shared with the copy.
+        let document = self.session.document().clone();
+        match Job::start("audit", self.wake.clone(), move |_| audit(&document)) {
+            Ok(job) => self.audit = Some((state, job)),
+            Err(error) => tracing::warn!("the audit cannot be started: {error}"),
         }
     }
 
@@ -204,6 +238,7 @@ impl Editor {
             && overlays::progress(context, &self.state, &label, &progress)
         {
             self.loading = None;
+            self.waiting.clear();
             self.state.toasts.info("Cancelled.");
         }
         overlays::palette(&mut self.state, context);

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use super::editor::{Editor, Then};
 use crate::dialogs::{ENVIRONMENT_ENDINGS, MODEL_ENDINGS, PROJECT_ENDING, Wish};
 use crate::session::{self, Loaded};
-use crate::ui_state::ToastKind;
 use crate::worker::{Answer, Job, Progress};
 
 /// What a file is read for.
@@ -84,6 +83,10 @@ impl Editor {
 
     /// Starts to read a file.
     pub(super) fn load(&mut self, purpose: Purpose, path: PathBuf) {
+        if self.loading.is_some() && purpose == Purpose::Import {
+            self.waiting.push_back(path);
+            return;
+        }
         if self.loading.is_some() {
             self.state.toasts.warning("Another file is still being read; cancel it or wait.");
             return;
@@ -102,7 +105,12 @@ impl Editor {
 
     /// Takes over what a worker has read.
     pub(super) fn poll_loading(&mut self) {
-        let Some(loading) = self.loading.take() else { return };
+        let Some(loading) = self.loading.take() else {
+            if let Some(next) = self.waiting.pop_front() {
+                self.load(Purpose::Import, next);
+            }
+            return;
+        };
         match loading.job.poll() {
             Answer::Running => self.loading = Some(loading),
             Answer::Died => {
@@ -219,11 +227,6 @@ impl Editor {
             Then::Open(path) => self.load(Purpose::Open, path),
             Then::Quit => self.quit = true,
         }
-    }
-
-    /// Whether an error is shown now; tests look at it.
-    pub fn shows_error(&self) -> bool {
-        self.state.toasts.items.iter().any(|toast| toast.kind == ToastKind::Error)
     }
 }
 

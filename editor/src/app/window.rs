@@ -440,7 +440,8 @@ impl EditorWindow {
         let fresh = full.is_some_and(|full| self.shown.as_ref() == Some(&self.key(full)));
         let whole = self.editor.state.view.divisor == 1;
         let unfinished = full.is_some_and(|full| {
-            self.broken.as_ref() != Some(&self.key(full)) && !(fresh && whole && self.editor.session.is_converged())
+            self.broken.as_ref() != Some(&self.key(full))
+                && !(fresh && whole && self.editor.session.is_converged())
         });
         let samples = self.editor.session.samples();
         let nothing_new = samples == self.samples;

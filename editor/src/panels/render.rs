@@ -55,8 +55,6 @@ fn pipeline_tip(pipeline: Pipeline) -> &'static str {
         Pipeline::Raster => "Rasterised surfaces, deferred shading, no rays",
         Pipeline::Hybrid => "Rasterised surfaces, ray-traced shadows, reflections and refractions",
         Pipeline::Raytraced => "The same with ray-traced first surfaces",
-        #[expect(unreachable_patterns, reason = "pipelines are still being added")]
-        _ => "",
     }
 }
 

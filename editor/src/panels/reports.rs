@@ -1,13 +1,12 @@
 //! The panels of figures: passes, what was left out, health, log. Enters: statistics, findings, log lines.
 //! Leaves: a selection when a finding is clicked. It measures nothing itself.
 
-use caustica_scene::{Severity, Subject, Target, audit};
+use caustica_scene::{Severity, Subject, Target};
 use egui::{Align, Color32, CornerRadius, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use egui_phosphor::regular as icon;
 
 use super::Cx;
 use crate::theme;
-use crate::ui_state::Health;
 
 /// Share of a new measurement in the smoothed figure.
 const SMOOTHING: f64 = 0.12;
@@ -88,20 +87,17 @@ pub fn left_out(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
-/// Findings of the audit. It runs again when the document changed and no drag is going on.
+/// Findings of the latest audit.
 pub fn health(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let history = cx.session.history();
-    let state = history.state();
-    let stale = cx.state.health.as_ref().is_none_or(|health| health.state != state);
-    if stale && !history.gesture_is_open() {
-        cx.state.health = Some(Health { state, findings: audit(cx.session.document()) });
-    }
     let non_finite = cx.session.statistics().non_finite;
     if non_finite > 0 {
         let text = format!("{}  {non_finite} samples were no finite numbers and were dropped", icon::WARNING);
         ui.colored_label(ui.visuals().warn_fg_color, text);
     }
-    let Some(health) = &cx.state.health else { return };
+    let Some(health) = &cx.state.health else {
+        super::empty_note(ui, "The scene is being looked at.");
+        return;
+    };
     if health.findings.is_empty() {
         super::empty_note(ui, "The audit found nothing.");
         return;

@@ -36,11 +36,10 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mark = marks(cx, ui, &view, rect);
     let frame = gizmo_frame(cx, &view);
     view_input::gizmo(cx, ui, &response, &view, frame.as_ref());
-    view_input::click(cx, ui, &response, mark);
     paint_gizmo(cx, ui, &view, rect, frame);
-    let clicked_axis = axis_cross(cx, ui, &view, rect, &response);
-    if let Some(axis) = clicked_axis {
-        cx.act(Action::AxisView(axis));
+    match axis_cross(cx, ui, &view, rect, &response) {
+        Some(axis) => cx.act(Action::AxisView(axis)),
+        None => view_input::click(cx, ui, &response, mark),
     }
     figures(cx, ui, rect);
     response.context_menu(|ui| context_menu(cx, ui));
@@ -123,17 +122,32 @@ fn paint_gizmo(cx: &Cx<'_>, ui: &Ui, view: &ViewProjection, rect: Rect, frame: O
     }
 }
 
-/// Draws a mark for each light and camera; gives the one under the pointer.
-fn marks(cx: &Cx<'_>, ui: &Ui, view: &ViewProjection, rect: Rect) -> Option<Target> {
+/// Lights and cameras of the document, collected anew only when nodes came or went.
+fn marked(cx: &mut Cx<'_>) -> Vec<Target> {
+    let revision = cx.session.history().structure_revision();
+    if let Some((at, targets)) = &cx.state.view.marked
+        && *at == revision
+    {
+        return targets.clone();
+    }
     let document = cx.session.document();
-    let lights =
-        document.lights().map(|light| (light.target, light.world_from_node.translation, light.visible));
-    let cameras =
-        document.cameras().map(|camera| (camera.target, camera.world_from_node.translation, camera.visible));
+    let lights = document.lights().map(|light| light.target);
+    let cameras = document.cameras().map(|camera| camera.target);
+    let targets: Vec<Target> = lights.chain(cameras).take(MOST_MARKS).collect();
+    cx.state.view.marked = Some((revision, targets.clone()));
+    targets
+}
+
+/// Draws a mark for each light and camera; gives the one under the pointer.
+fn marks(cx: &mut Cx<'_>, ui: &Ui, view: &ViewProjection, rect: Rect) -> Option<Target> {
+    let targets = marked(cx);
+    let document = cx.session.document();
     let pointer = ui.ctx().pointer_hover_pos();
     let painter = ui.painter_at(rect);
     let mut under_pointer = None;
-    for (target, place, visible) in lights.chain(cameras).take(MOST_MARKS) {
+    for target in targets {
+        let Some(place) = document.world_from(target).map(|world| world.translation) else { continue };
+        let visible = document.effectively_visible(target);
         let Some(point) = view.project(place) else { continue };
         let at = rect.min + vec2(point.x as f32, point.y as f32);
         if !rect.contains(at) || place.distance(view.eye()) < 1e-3 {

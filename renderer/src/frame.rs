@@ -76,7 +76,14 @@ pub(crate) fn record(
     let mut displayed = None;
     let has_samples = view.accumulation.samples() > 0;
     if band.last || (has_samples && view.displayed.as_ref() != Some(&display)) {
-        passes.post.record(recorder, &scope, targets, (parity, shown_history), accumulator, view.settings().show)?;
+        passes.post.record(
+            recorder,
+            &scope,
+            targets,
+            (parity, shown_history),
+            accumulator,
+            view.settings().show,
+        )?;
         displayed = Some(display);
     }
     let counters = &view.counters;

@@ -183,7 +183,11 @@ impl Needs {
             (self.environment_map || !self.environment, "environment map", "the environment is a constant"),
             (self.textures, "texture look-ups", "no material has a texture"),
             (self.normal_maps, "normal mapping", "no material has a normal map"),
-            (rays && self.reflection, "reflection rays", why_no_secondary("no surface is smooth enough to mirror")),
+            (
+                rays && self.reflection,
+                "reflection rays",
+                why_no_secondary("no surface is smooth enough to mirror"),
+            ),
             (rays && self.refraction, "refraction rays", why_no_secondary("no surface lets light pass")),
             (self.emission, "emissive target", "no surface emits"),
             (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),

@@ -143,14 +143,7 @@ impl Scope<'_> {
         let push = self.push(argument0, rows.start);
         let size = [self.extent[0], rows.end - rows.start];
         recorder.pass(label, |recorder| {
-            recorder.trace_rays(
-                pipeline,
-                Some(self.set),
-                binds,
-                &uses,
-                bytemuck::bytes_of(&push),
-                size,
-            )
+            recorder.trace_rays(pipeline, Some(self.set), binds, &uses, bytemuck::bytes_of(&push), size)
         })?;
         Ok(())
     }

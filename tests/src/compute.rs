@@ -16,7 +16,7 @@ use caustica_gpu::{
 use caustica_renderer::shader::{ShaderSources, Source, SpirvCache, compile, reflect};
 
 use crate::gpu::Session;
-use crate::shader_folder;
+use crate::shaders_under_test;
 
 const LOCAL_SIZE: u32 = 64;
 
@@ -60,7 +60,7 @@ pub fn bytes<T: Pod>(values: &[T]) -> &[u8] {
 /// # Panics
 /// When it is not there.
 pub fn shader_text(file: &str) -> String {
-    ShaderSources::new(Some(shader_folder())).read(file).expect("a shader of the repository")
+    ShaderSources::new(shaders_under_test()).read(file).expect("a shader of the repository")
 }
 
 /// Runs a snippet; the result holds `values` floats for each of `count` invocations.
@@ -118,7 +118,7 @@ pub fn run(session: &mut Session, snippet: &Snippet<'_>) -> Vec<f32> {
 }
 
 fn source_of(snippet: &Snippet<'_>) -> Source {
-    let sources = ShaderSources::new(Some(shader_folder()));
+    let sources = ShaderSources::new(shaders_under_test());
     let mut text = String::from("#version 460\n#extension GL_GOOGLE_include_directive : require\n");
     let mut texts = std::collections::BTreeMap::new();
     let _ = writeln!(text, "layout(local_size_x = {LOCAL_SIZE}) in;");

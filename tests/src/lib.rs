@@ -17,8 +17,13 @@ pub fn repository() -> PathBuf {
     tests.parent().map_or_else(|| tests.clone(), PathBuf::from)
 }
 
-/// The folder of the shaders, read fresh, not the copy in the binary. `CAUSTICA_TEST_SHADERS` names another one: with a
-/// fault planted in it, the tests must fail.
+/// The folder of the shaders.
 pub fn shader_folder() -> PathBuf {
-    std::env::var_os("CAUSTICA_TEST_SHADERS").map_or_else(|| repository().join("shaders"), PathBuf::from)
+    repository().join("shaders")
+}
+
+/// Where the tests take shaders from: the copy in the binary, or the folder that `CAUSTICA_TEST_SHADERS` names. With a
+/// fault planted there, the tests must fail.
+pub fn shaders_under_test() -> Option<PathBuf> {
+    std::env::var_os("CAUSTICA_TEST_SHADERS").map(PathBuf::from)
 }

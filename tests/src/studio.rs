@@ -4,7 +4,7 @@ use caustica_renderer::delta::{Camera, SceneDelta};
 use caustica_renderer::{Accumulated, Renderer, RendererOptions, Statistics, View, ViewId, ViewSettings};
 
 use crate::gpu::{Session, session};
-use crate::shader_folder;
+use crate::shaders_under_test;
 
 /// A renderer, one view, and the device's attention for one test.
 pub struct Studio {
@@ -31,7 +31,7 @@ impl Studio {
     /// When the device cannot.
     pub fn with_window(extent: [u32; 2], settings: ViewSettings, window: bool) -> Self {
         let mut session = session();
-        let options = RendererOptions { shaders: Some(shader_folder()) };
+        let options = RendererOptions { shaders: shaders_under_test() };
         let mut renderer = Renderer::new(&session.device, &mut session.frames, &options).expect("a renderer");
         let view = renderer.create_view(extent, settings, window).expect("a view");
         Self { renderer, view, session }

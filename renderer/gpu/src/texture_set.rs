@@ -34,7 +34,8 @@ impl TextureSet {
             .stage_flags(vk::ShaderStageFlags::FRAGMENT)];
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&binding);
         // SAFETY: plain creation; destroyed through the retire queue.
-        let layout = unsafe { device.raw.create_descriptor_set_layout(&info, None) }.during("vkCreateDescriptorSetLayout")?;
+        let layout = unsafe { device.raw.create_descriptor_set_layout(&info, None) }
+            .during("vkCreateDescriptorSetLayout")?;
         let mut set = Self {
             device: Arc::clone(device),
             layout,
@@ -42,10 +43,12 @@ impl TextureSet {
             sampler: vk::Sampler::null(),
             set: vk::DescriptorSet::null(),
         };
-        let sizes = [vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: 1 }];
+        let sizes =
+            [vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: 1 }];
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: as above.
-        set.pool = unsafe { device.raw.create_descriptor_pool(&info, None) }.during("vkCreateDescriptorPool")?;
+        set.pool =
+            unsafe { device.raw.create_descriptor_pool(&info, None) }.during("vkCreateDescriptorPool")?;
         let info = vk::SamplerCreateInfo::default()
             .mag_filter(vk::Filter::LINEAR)
             .min_filter(vk::Filter::LINEAR)
@@ -56,7 +59,8 @@ impl TextureSet {
         let layouts = [layout];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(set.pool).set_layouts(&layouts);
         // SAFETY: pool and layout are alive.
-        set.set = unsafe { device.raw.allocate_descriptor_sets(&info) }.during("vkAllocateDescriptorSets")?[0];
+        set.set =
+            unsafe { device.raw.allocate_descriptor_sets(&info) }.during("vkAllocateDescriptorSets")?[0];
         let info = [vk::DescriptorImageInfo {
             sampler: set.sampler,
             image_view: image.raw_view(),
@@ -110,10 +114,11 @@ impl UploadQueue {
     /// # Errors
     /// When the queue was poisoned by a panic.
     pub fn with<R>(&self, body: impl FnOnce(vk::Queue, vk::CommandPool) -> R) -> Result<R> {
-        let queue = self.device.queue.lock().map_err(|_| GpuError::Vulkan {
-            call: "locking the queue",
-            result: vk::Result::ERROR_UNKNOWN,
-        })?;
+        let queue = self
+            .device
+            .queue
+            .lock()
+            .map_err(|_| GpuError::Vulkan { call: "locking the queue", result: vk::Result::ERROR_UNKNOWN })?;
         Ok(body(*queue, self.pool))
     }
 }

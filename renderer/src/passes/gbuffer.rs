@@ -2,8 +2,8 @@
 //! motion, depth. By raster (ids first, then resolved once a pixel) or by rays, with the same result.
 
 use caustica_gpu::{
-    Bind, ColorTarget, ComputePipeline, Draw, Format, GraphicsDesc, GraphicsPipeline, Image, RayTracingPipeline,
-    Recorder, Stage,
+    Bind, ColorTarget, ComputePipeline, Draw, Format, GraphicsDesc, GraphicsPipeline, Image,
+    RayTracingPipeline, Recorder, Stage,
 };
 
 use super::{Builder, Scope};

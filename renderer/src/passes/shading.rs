@@ -44,7 +44,9 @@ impl Shading {
         ];
         let has_light = u32::from(light.is_some());
         match self {
-            Self::Rays(pipeline) => scope.rays(recorder, "shading.trace", pipeline, &binds, scope.rows.clone(), has_light),
+            Self::Rays(pipeline) => {
+                scope.rays(recorder, "shading.trace", pipeline, &binds, scope.rows.clone(), has_light)
+            }
             Self::NoRays(pipeline) => scope.compute(recorder, "shading", pipeline, &binds, &[], has_light),
         }
     }

@@ -41,7 +41,9 @@ impl Shadow {
             ("direct_specular", Bind::Image(specular)),
         ];
         match self {
-            Self::Rays(pipeline) => scope.rays(recorder, "shadow.trace", pipeline, &binds, scope.rows.clone(), 0),
+            Self::Rays(pipeline) => {
+                scope.rays(recorder, "shadow.trace", pipeline, &binds, scope.rows.clone(), 0)
+            }
             Self::NoRays(pipeline) => scope.compute(recorder, "shadow.light", pipeline, &binds, &[], 0),
         }
     }

@@ -93,7 +93,8 @@ impl Bands {
 
     fn plan(&mut self, times: &[(String, f64)]) {
         let Some(budget_ms) = self.budget_ms else { return };
-        let cut_ms: f64 = times.iter().filter(|(label, _)| label.ends_with(CUT_PASSES)).map(|(_, ms)| ms).sum();
+        let cut_ms: f64 =
+            times.iter().filter(|(label, _)| label.ends_with(CUT_PASSES)).map(|(_, ms)| ms).sum();
         let bands = (cut_ms / budget_ms.max(1.0)).ceil().clamp(1.0, f64::from(MOST_BANDS));
         self.rows_per_band = Some((f64::from(self.height) / bands).ceil() as u32);
     }

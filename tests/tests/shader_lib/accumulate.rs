@@ -11,7 +11,7 @@ use caustica_renderer::shader::{ShaderSources, SpirvCache, compile, reflect};
 use caustica_tests::compute::{Snippet, run, shader_text};
 use caustica_tests::gpu::{Session, session};
 use caustica_tests::numbers::Random;
-use caustica_tests::shader_folder;
+use caustica_tests::shaders_under_test;
 
 const SAMPLES: usize = 65_536;
 
@@ -125,7 +125,7 @@ struct Pass {
 impl Pass {
     fn new(session: &Session, extent: [u32; 2]) -> Self {
         let file = "passes/accumulate/accumulate.comp";
-        let source = ShaderSources::new(Some(shader_folder())).load(file).expect("the pass");
+        let source = ShaderSources::new(shaders_under_test()).load(file).expect("the pass");
         let words = compile(&source, &SpirvCache::of_user()).expect("it compiles");
         let interface = reflect(file, &words).expect("its interface").interface;
         let device = &session.device;

@@ -30,7 +30,12 @@ impl Recorder {
     }
 
     /// The uses that a pipeline's bindings imply; checks that each one is given and of the right kind.
-    pub(super) fn uses_of<'a>(&self, pipeline: &Raw, stage: Stage, binds: &[(&str, Bind<'a>)]) -> Result<Vec<Use<'a>>> {
+    pub(super) fn uses_of<'a>(
+        &self,
+        pipeline: &Raw,
+        stage: Stage,
+        binds: &[(&str, Bind<'a>)],
+    ) -> Result<Vec<Use<'a>>> {
         let find = |name: &str| binds.iter().find(|(n, _)| *n == name).map(|(_, bind)| *bind);
         let mut uses = Vec::new();
         for binding in &pipeline.interface.bindings {
@@ -77,7 +82,12 @@ impl Recorder {
         Ok(())
     }
 
-    pub(super) fn push_descriptors(&self, pipeline: &Raw, point: vk::PipelineBindPoint, binds: &[(&str, Bind<'_>)]) {
+    pub(super) fn push_descriptors(
+        &self,
+        pipeline: &Raw,
+        point: vk::PipelineBindPoint,
+        binds: &[(&str, Bind<'_>)],
+    ) {
         let bindings = &pipeline.interface.bindings;
         let mut images = Vec::with_capacity(bindings.len());
         let mut buffers = Vec::with_capacity(bindings.len());

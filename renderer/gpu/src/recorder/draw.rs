@@ -14,7 +14,7 @@ impl Recorder {
     /// Draws into cleared targets: colours to 0, depth to 0 (infinitely far in reverse depth).
     ///
     /// # Errors
-    /// [`GpuError::Interface`] when `binds` and the shader disagree.
+    /// [`crate::GpuError::Interface`] when `binds` and the shader disagree.
     #[expect(
         clippy::too_many_arguments,
         reason = "one call a raster pass; a struct would only rename the arguments"

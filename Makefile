@@ -8,8 +8,8 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 CAUSTICA := $(TARGET_DIR)/release/caustica
 DEMO := projects/gallery/gallery.caustica.json
 # Of the demo picture; `make demo SIZE=1920x1080 SAMPLES=256` overrides them.
-SIZE ?= 1280x720
-SAMPLES ?= 64
+SIZE ?= 960x540
+SAMPLES ?= 48
 
 .PHONY: help setup compiler demo test check clean
 

@@ -9,6 +9,7 @@ mod instances;
 mod lights;
 mod materials;
 mod meshes;
+mod spatial_order;
 mod table;
 mod textures;
 

@@ -3,9 +3,11 @@
 #![expect(clippy::expect_used, clippy::panic, reason = "a test says what is wrong by panicking")]
 
 pub mod compute;
+pub mod desktop;
 pub mod gpu;
 pub mod numbers;
 pub mod picture;
+pub mod program;
 pub mod scene;
 pub mod studio;
 

@@ -17,7 +17,7 @@ pub struct Tolerance {
 }
 
 /// Folder for pictures that failed.
-fn failure_folder() -> PathBuf {
+pub fn failure_folder() -> PathBuf {
     let executable = std::env::current_exe().unwrap_or_default();
     executable.ancestors().nth(3).unwrap_or_else(|| Path::new(".")).join("test-pictures")
 }

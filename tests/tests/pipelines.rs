@@ -2,9 +2,9 @@
 //! a scene with and without what cannot be seen.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
-use caustica_renderer::delta::{Instance, InstanceId, SceneDelta};
+use caustica_renderer::delta::{Geometry, Instance, InstanceId, SceneDelta};
 use caustica_renderer::{Accumulated, NeedsMode, Pipeline, ViewSettings};
-use caustica_tests::scene::{Scene, camera_parallel, lambert, point_light, quad, sphere, zoo};
+use caustica_tests::scene::{Scene, camera_parallel, glass, lambert, point_light, quad, sphere, zoo};
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec3};
 
@@ -147,6 +147,43 @@ fn what_cannot_be_seen_changes_nothing_else() {
         }
         studio.apply(&with(true, in_front()));
         assert_eq!(differing(&shown, &studio.mean(3), 1e-6), 0, "and back, {}", pipeline.name());
+    }
+}
+
+#[test]
+fn back_sides_are_unseen_even_beside_glass() {
+    // One mesh of three parts: a single-sided square turned away, one turned to the camera, and a pane of glass.
+    let mut parts = quad(1.0, 1.0);
+    for (dx, normal, order) in [(1.2, Vec3::Z, [0, 1, 2, 0, 2, 3]), (0.0, Vec3::NEG_Z, [0, 2, 1, 0, 3, 2])] {
+        let first = parts.positions.len() as u32;
+        let corners: Vec<Vec3> = parts.positions[..4].iter().map(|p| *p + Vec3::X * dx).collect();
+        parts.positions.extend(if dx == 0.0 {
+            corners.iter().map(|p| *p - Vec3::X * 1.2).collect()
+        } else {
+            corners
+        });
+        parts.normals.extend([normal; 4]);
+        parts.tangents.extend_from_within(..4);
+        parts.tex_coords0.extend_from_within(..4);
+        let geometry = Geometry { first_index: parts.indices.len() as u32, ..parts.geometries[0] };
+        parts.indices.extend(order.map(|corner| first + corner));
+        parts.geometries.push(geometry);
+    }
+    for pipeline in Pipeline::ALL {
+        let mut scene = Scene::new();
+        let (pane, paint) = (scene.material(glass(1.0)), scene.material(lambert(0.8)));
+        let mesh = scene.mesh(parts.clone());
+        scene.place(mesh, paint, Affine3A::IDENTITY);
+        scene.delta.instances[0].1.materials = vec![pane, paint, paint];
+        scene.surround(0.5);
+        let still = ViewSettings { jitter: false, ..settings(pipeline) };
+        let mut studio = Studio::of(EXTENT, still, &scene.delta, camera_parallel(1.0, 1.2));
+        let image = studio.mean(32);
+        let at = |x: f32| image.mean[(32 * EXTENT[0] + ((x / 1.8 + 1.0) * 48.0) as u32) as usize][0];
+        // Glass of index 1 changes nothing; the square turned away shows the background, the other one its paint.
+        assert!((at(0.0) - 0.5).abs() < 1e-3, "{}: glass {}", pipeline.name(), at(0.0));
+        assert_eq!(at(-1.2), 0.5, "{}: the back", pipeline.name());
+        assert!((at(1.2) - 0.4).abs() < 0.02, "{}: the front {}", pipeline.name(), at(1.2));
     }
 }
 

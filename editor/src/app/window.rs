@@ -452,7 +452,8 @@ impl EditorWindow {
         if goes_on && !repaint_delay.is_zero() {
             self.silent = fresh && whole && nothing_new;
             self.go_on_soon();
-        } else if goes_on || repaint_delay.is_zero() {
+        } else if goes_on || repaint_delay.is_zero() || !nothing_new {
+            // The panels were drawn before the last sample was counted: once more.
             self.request_redraw();
         } else {
             self.redraw_at = self.panels_due;

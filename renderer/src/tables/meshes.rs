@@ -6,6 +6,7 @@ use std::sync::Arc;
 use caustica_gpu::{Buffer, BufferUse, Device, Location, MemoryUse, Recorder};
 use glam::{Affine3A, Vec3};
 
+use super::spatial_order::sort_triangles;
 use crate::delta::{Mesh, MeshId};
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{self, GEOMETRY_MOVED, Rows, VertexAttributes};
@@ -68,6 +69,7 @@ impl Meshes {
     /// Uploads a mesh, or its new content.
     pub(crate) fn set(&mut self, recorder: &mut Recorder, id: MeshId, mesh: &Arc<Mesh>) -> Result<()> {
         check(mesh, &self.device)?;
+        let mesh = &Arc::new(in_spatial_order(mesh));
         let make = |what: &str, size: usize| {
             let name = format!("{} {what}", mesh.name);
             Buffer::new(
@@ -124,6 +126,16 @@ pub(crate) fn rows_of(map: &Affine3A) -> Rows {
         [m.x_axis.y, m.y_axis.y, m.z_axis.y, t.y],
         [m.x_axis.z, m.y_axis.z, m.z_axis.z, t.z],
     ]
+}
+
+/// The mesh with the triangles of each geometry in spatial order.
+fn in_spatial_order(mesh: &Mesh) -> Mesh {
+    let mut sorted = mesh.clone();
+    for geometry in &mesh.geometries {
+        let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
+        sort_triangles(&mesh.positions, &mut sorted.indices[range]);
+    }
+    sorted
 }
 
 /// Refuses a mesh that would read out of bounds or that the device cannot take.

@@ -97,6 +97,36 @@ fn the_mean_of_65536_samples_is_exact_to_a_millionth() {
     );
 }
 
+#[test]
+fn the_fold_loses_nothing_beside_a_large_sum() {
+    // A million samples of 0.1 beside 1e8, where floats are 8 apart: the plain sum does not move at all.
+    let functions = functions_of_the_pass();
+    let body = "
+        vec4 high = vec4(1e8), low = vec4(0.0);
+        float plain = 1e8;
+        for (uint i = 0u; i < 1000000u; ++i) {
+            fold(high, low, vec4(0.1));
+            plain += 0.1;
+        }
+        write(0u, high.x); write(1u, low.x); write(2u, plain);";
+    let mut session = session();
+    let values = run(
+        &mut session,
+        &Snippet {
+            includes: &["shared/frame.glsl"],
+            functions: &functions,
+            body,
+            values: 3,
+            count: 1,
+            ..Snippet::default()
+        },
+    );
+    let exact = 1e8 + 1e6 * f64::from(0.1_f32);
+    let sum = f64::from(values[0]) + f64::from(values[1]);
+    assert!((sum - exact).abs() < 0.1, "{sum} instead of {exact}");
+    assert_eq!(values[2], 1e8, "the plain sum is expected to stall");
+}
+
 /// `sample_value` of the snippet: pcg4d of Jarzynski and Olano 2020.
 fn sample_value(pixel: u32, i: u32) -> f32 {
     let mut v = [pixel, i, 0, 0].map(|x: u32| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));

@@ -1,0 +1,274 @@
+//! The command line as a user and a script see it: exit codes, messages, images, the one JSON object.
+#![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
+
+use std::path::{Path, PathBuf};
+
+use caustica_tests::program::{Run, caustica};
+use caustica_tests::repository;
+use serde_json::Value;
+
+fn gallery() -> String {
+    repository().join("projects/gallery/gallery.caustica.json").display().to_string()
+}
+
+/// The folder of shared models, if it is there.
+fn shared_assets() -> Option<PathBuf> {
+    let folder = repository().join("../shared/assets");
+    let there = folder.is_dir();
+    if !there {
+        println!("skipped: {} is not there", folder.display());
+    }
+    there.then_some(folder)
+}
+
+fn json_of(run: &Run) -> Value {
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_eq!(run.stdout.trim().lines().count(), 1, "one object and nothing else: {}", run.stdout);
+    serde_json::from_str(&run.stdout).expect("JSON on standard output")
+}
+
+/// Renders a small picture with validation on; the layer must be silent.
+fn render(folder: &Path, file: &str, more: &[&str]) -> Run {
+    let mut arguments = vec!["render", file, "--size", "64x48", "--validation"];
+    arguments.extend(more);
+    let run = caustica(folder, &arguments);
+    assert!(!run.stderr.contains("validation"), "{}", run.stderr);
+    run
+}
+
+#[test]
+fn devices_are_listed_and_one_is_chosen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let devices = json_of(&caustica(folder.path(), &["devices", "--json"]));
+    let chosen = devices["chosen"].as_u64().expect("a chosen device") as usize;
+    let list = devices["devices"].as_array().expect("devices");
+    assert_eq!(list[chosen]["suitable"], true);
+    let name = list[chosen]["name"].as_str().expect("a name");
+    let text = caustica(folder.path(), &["devices"]);
+    assert_eq!(text.code, Some(0));
+    assert!(text.stdout.contains(name) && text.stdout.contains("chosen"), "{}", text.stdout);
+}
+
+#[test]
+fn the_gallery_renders_to_a_png_and_tells_what_it_did() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let figures =
+        json_of(&render(folder.path(), &gallery(), &["-o", "out/a.png", "--samples", "4", "--json"]));
+    assert_eq!((&figures["samples"], &figures["size"]), (&Value::from(4), &serde_json::json!([64, 48])));
+    assert_eq!(figures["non_finite_samples"], 0);
+    assert_eq!(figures["pipeline"], "hybrid");
+    for key in ["device", "version", "reset_reason"] {
+        assert!(figures[key].as_str().is_some_and(|text| !text.is_empty()), "{key}: {}", figures[key]);
+    }
+    let passes = figures["ms_per_pass"].as_object().expect("times of the passes");
+    for label in ["shadow.trace", "shading.trace", "accumulate", "post"] {
+        assert!(passes[label].as_f64().is_some_and(|ms| ms > 0.0), "{label} in {passes:?}");
+    }
+    assert!(figures["acceleration_structures"]["blas_count"].as_u64().is_some_and(|n| n > 5));
+    assert!(figures["memory_bytes"]["geometry"].as_u64().is_some_and(|n| n > 1000));
+    let left_out = figures["left_out"].as_array().expect("what was left out");
+    assert!(left_out.iter().all(|entry| entry["what"].is_string() && entry["why"].is_string()));
+
+    let picture = image::open(folder.path().join("out/a.png")).expect("the PNG").to_rgb8();
+    assert_eq!(picture.dimensions(), (64, 48));
+    let mean = picture.pixels().flat_map(|p| p.0).map(f64::from).sum::<f64>() / (64.0 * 48.0 * 3.0);
+    assert!((20.0..235.0).contains(&mean), "mean byte {mean}");
+}
+
+#[test]
+fn the_same_command_writes_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bytes = |name: &str, more: &[&str]| {
+        let mut arguments = vec!["-o", name, "--samples", "3"];
+        arguments.extend(more);
+        assert_eq!(render(folder.path(), &gallery(), &arguments).code, Some(0));
+        std::fs::read(folder.path().join(name)).expect("an image")
+    };
+    let first = bytes("a.png", &[]);
+    assert_eq!(first, bytes("b.png", &[]));
+    assert_ne!(first, bytes("c.png", &["--seed", "5"]));
+}
+
+/// Reads an EXR written by the program: pixels and attributes as text.
+fn read_exr(path: &Path) -> (Vec<[f32; 3]>, String) {
+    use exr::prelude::{ReadChannels, ReadLayers};
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| (size.width(), vec![[0.0_f32; 3]; size.width() * size.height()]),
+            |(width, pixels): &mut (usize, Vec<[f32; 3]>), at, (r, g, b): (f32, f32, f32)| {
+                pixels[at.y() * *width + at.x()] = [r, g, b];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .expect("the EXR");
+    let attributes = format!("{:?}", image.layer_data.attributes);
+    (image.layer_data.channel_data.pixels.1, attributes)
+}
+
+#[test]
+fn an_exr_holds_radiance_and_its_origin() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = render(folder.path(), &gallery(), &["-o", "a.exr", "--samples", "6", "--exposure", "3"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let (whole, attributes) = read_exr(&folder.path().join("a.exr"));
+    assert_eq!(whole.len(), 64 * 48);
+    for word in ["caustica.samples", "caustica.seconds", "caustica.device", "software_name"] {
+        assert!(attributes.contains(word), "{word} in {attributes}");
+    }
+    // Two halves of the sample set have the mean of the whole; exposure changes nothing in an EXR.
+    let mut halves = Vec::new();
+    for offset in ["0", "3"] {
+        let run =
+            render(folder.path(), &gallery(), &["-o", "b.exr", "--samples", "3", "--sample-offset", offset]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        halves.push(read_exr(&folder.path().join("b.exr")).0);
+    }
+    for (i, pixel) in whole.iter().enumerate() {
+        for channel in 0..3 {
+            let mean = 0.5 * (halves[0][i][channel] + halves[1][i][channel]);
+            let difference = (pixel[channel] - mean).abs();
+            assert!(difference <= 1e-5 * mean.abs() + 1e-7, "pixel {i}: {} {mean}", pixel[channel]);
+        }
+    }
+}
+
+#[test]
+fn every_pipeline_and_target_can_be_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for pipeline in ["raster", "hybrid", "raytraced"] {
+        let arguments = ["-o", "a.png", "--samples", "1", "--pipeline", pipeline, "--json"];
+        assert_eq!(json_of(&render(folder.path(), &gallery(), &arguments))["pipeline"], pipeline);
+    }
+    let all = json_of(&render(
+        folder.path(),
+        &gallery(),
+        &["-o", "a.png", "--samples", "1", "--needs", "all", "--json"],
+    ));
+    let auto = json_of(&render(folder.path(), &gallery(), &["-o", "b.png", "--samples", "1", "--json"]));
+    let count = |figures: &Value| figures["left_out"].as_array().map_or(0, Vec::len);
+    assert!(count(&all) <= count(&auto));
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect("an image");
+    assert_eq!(bytes("a.png"), bytes("b.png"), "what is not needed changes no pixel");
+    for target in ["base_color", "normal", "depth"] {
+        let run = render(folder.path(), &gallery(), &["-o", "c.png", "--samples", "1", "--show", target]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert_ne!(bytes("c.png"), bytes("a.png"), "{target}");
+    }
+}
+
+#[test]
+fn a_constant_environment_comes_from_the_command_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("far.obj"), "v 0 0 -1e3\nv 1e-3 0 -1e3\nv 0 1e-3 -1e3\nf 1 2 3\n")
+        .expect("a model");
+    let run =
+        render(folder.path(), "far.obj", &["-o", "a.exr", "--samples", "1", "--environment", "0.25,0.5,2"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let (pixels, _) = read_exr(&folder.path().join("a.exr"));
+    assert_eq!(pixels[0], [0.25, 0.5, 2.0]);
+}
+
+#[test]
+fn faults_of_the_input_end_with_1_and_name_the_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("broken.gltf"), "{ \"asset\": ").expect("a file");
+    std::fs::write(folder.path().join("text.xyz"), "nothing").expect("a file");
+    for (file, output) in [
+        ("missing.glb", "a.png"),
+        ("broken.gltf", "a.png"),
+        ("text.xyz", "a.png"),
+        (gallery().as_str(), "a.jpg"),
+    ] {
+        let run =
+            caustica(folder.path(), &["render", file, "-o", output, "--size", "16x16", "--samples", "1"]);
+        assert_eq!(run.code, Some(1), "{file}: {}", run.stderr);
+        let named = if output == "a.jpg" { output } else { file };
+        assert!(run.stderr.contains(named), "{named} in: {}", run.stderr);
+        assert!(run.stdout.is_empty() && !folder.path().join(output).exists());
+    }
+    let check = caustica(folder.path(), &["check", "broken.gltf"]);
+    assert_eq!(check.code, Some(1), "{}{}", check.stdout, check.stderr);
+}
+
+#[test]
+fn wrong_usage_ends_with_2() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let gallery = gallery();
+    for arguments in [
+        vec!["render"],
+        vec!["render", &gallery],
+        vec!["render", &gallery, "-o", "a.png", "--size", "0x10"],
+        vec!["render", &gallery, "-o", "a.png", "--samples", "0"],
+        vec!["render", &gallery, "-o", "a.png", "--pipeline", "magic"],
+        vec!["render", &gallery, "-o", "a.png", "--samples", "3", "--time", "1"],
+        vec!["--nonsense"],
+    ] {
+        let run = caustica(folder.path(), &arguments);
+        assert_eq!(run.code, Some(2), "{arguments:?}: {}", run.stderr);
+        assert!(run.stdout.is_empty());
+    }
+    let help = caustica(folder.path(), &["--help"]);
+    assert_eq!(help.code, Some(0));
+    assert!(help.stdout.contains("render"));
+}
+
+#[test]
+fn faults_of_the_device_end_with_3() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let gallery = gallery();
+    let common = ["render", &gallery, "-o", "a.png", "--size", "64x48", "--samples", "1"];
+    let run = caustica(folder.path(), &[&common[..], &["--device", "no such device"]].concat());
+    assert_eq!(run.code, Some(3), "{}", run.stderr);
+    assert!(run.stderr.contains("no suitable Vulkan device"), "{}", run.stderr);
+    let run = caustica(folder.path(), &[&common[..], &["--memory-budget", "16"]].concat());
+    assert_eq!(run.code, Some(3), "{}", run.stderr);
+    assert!(run.stderr.contains("out of device memory"), "{}", run.stderr);
+}
+
+#[test]
+fn check_accepts_the_demo() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = caustica(folder.path(), &["check", &gallery()]);
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    let run = caustica(folder.path(), &["check", &gallery(), "--json"]);
+    assert_eq!(json_of(&run)["errors"], 0);
+}
+
+#[test]
+fn models_of_other_hands_render() {
+    let Some(assets) = shared_assets() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    for model in
+        ["Box", "BoxTextured", "SimpleSparseAccessor", "NegativeScaleTest", "TransmissionTest", "CornellBox"]
+    {
+        let Some(file) = model_file(&assets.join("gltf").join(model)) else {
+            println!("skipped: no {model}");
+            continue;
+        };
+        let run =
+            render(folder.path(), &file.display().to_string(), &["-o", "a.png", "--samples", "1", "--json"]);
+        assert_eq!(json_of(&run)["non_finite_samples"], 0, "{model}");
+    }
+}
+
+/// The first model file below a folder.
+fn model_file(folder: &Path) -> Option<PathBuf> {
+    let mut waiting = vec![folder.to_owned()];
+    let mut found = Vec::new();
+    while let Some(next) = waiting.pop() {
+        for entry in std::fs::read_dir(next).ok()?.flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                waiting.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "gltf" || ending == "glb") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found.into_iter().next()
+}

@@ -21,6 +21,7 @@ pub(crate) use draws::Batch;
 pub(crate) use instances::{Instances, Slot};
 pub(crate) use materials::{Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits};
 pub(crate) use meshes::{Meshes, rows_of};
+pub(crate) use spatial_order::order_of;
 pub(crate) use table::Table;
 
 use crate::delta::SceneDelta;

@@ -83,6 +83,13 @@ impl Desktop {
         self.xdotool("sleep 0.2 mouseup 1");
     }
 
+    /// Keeps the screen as it is now beside the pictures that failed; where it is.
+    pub fn keep_screen(&self) -> PathBuf {
+        let path = failure_folder().join("desktop.png");
+        let kept = std::fs::create_dir_all(failure_folder()).is_ok() && self.screenshot().save(&path).is_ok();
+        if kept { path } else { PathBuf::from("(lost)") }
+    }
+
     /// The screen as it is now.
     ///
     /// # Panics
@@ -96,15 +103,6 @@ impl Desktop {
 
 impl Drop for Desktop {
     fn drop(&mut self) {
-        if std::thread::panicking() {
-            let path = failure_folder().join("desktop.png");
-            let saved =
-                std::fs::create_dir_all(failure_folder()).is_ok() && self.screenshot().save(&path).is_ok();
-            eprintln!(
-                "the screen at the end: {}",
-                if saved { path.display().to_string() } else { "lost".to_owned() }
-            );
-        }
         // Only the server that was started here.
         let _ = self.server.kill();
         let _ = self.server.wait();

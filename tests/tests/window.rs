@@ -2,6 +2,7 @@
 //! undo brings back, the process stays healthy and quits from inside.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
+use std::path::PathBuf;
 use std::process::{Child, Stdio};
 
 use caustica_tests::desktop::{Desktop, wait_for};
@@ -52,12 +53,30 @@ fn base64(bytes: &[u8]) -> String {
 }
 
 /// The editor, ended when the test ends.
-struct Editor(Child);
+struct Editor<'a> {
+    process: Child,
+    desktop: &'a Desktop,
+    log: PathBuf,
+}
 
-impl Drop for Editor {
+impl Editor<'_> {
+    fn log(&self) -> String {
+        std::fs::read_to_string(&self.log).unwrap_or_default()
+    }
+
+    fn assert_alive(&mut self) {
+        let ended = self.process.try_wait().expect("the process");
+        assert!(ended.is_none(), "the editor ended: {ended:?}");
+    }
+}
+
+impl Drop for Editor<'_> {
     fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        if std::thread::panicking() {
+            eprintln!("the screen: {}\nthe log:\n{}", self.desktop.keep_screen().display(), self.log());
+        }
+        let _ = self.process.kill();
+        let _ = self.process.wait();
     }
 }
 
@@ -108,17 +127,18 @@ fn an_object_is_selected_dragged_and_put_back() {
     let log = std::fs::File::create(&log_path).expect("a log");
     let desktop = Desktop::start([1600, 960]);
     let mut command = desktop.command(program());
-    command.arg("--validation").arg(&model).env("CAUSTICA_LOG", "warn").current_dir(folder.path());
+    command
+        .arg("--validation")
+        .arg(&model)
+        .env("CAUSTICA_LOG", "info")
+        .env("NO_COLOR", "1")
+        .current_dir(folder.path());
     command.stdout(log.try_clone().expect("a log")).stderr(log).stdin(Stdio::null());
-    let mut editor = Editor(command.spawn().expect("the editor starts"));
-    let read_log = || std::fs::read_to_string(&log_path).unwrap_or_default();
-    let alive = |editor: &mut Editor| {
-        let ended = editor.0.try_wait().expect("the process");
-        assert!(ended.is_none(), "the editor ended: {ended:?}\n{}", read_log());
-    };
+    let process = command.spawn().expect("the editor starts");
+    let mut editor = Editor { process, desktop: &desktop, log: log_path };
 
     let window = wait_for("the window", 60, || {
-        alive(&mut editor);
+        editor.assert_alive();
         desktop.window("Caustica")
     });
     desktop.xdotool(&format!("windowsize {window} {} {}", WINDOW[0], WINDOW[1]));
@@ -126,7 +146,7 @@ fn an_object_is_selected_dragged_and_put_back() {
     // The cube in the middle of the view is brighter than the panels around it.
     let middle = [WINDOW[0] * 48 / 100, WINDOW[1] * 43 / 100];
     wait_for("a picture in the resized window", 60, || {
-        alive(&mut editor);
+        editor.assert_alive();
         let screen = desktop.screenshot();
         let outside = screen.get_pixel(WINDOW[0] + 50, WINDOW[1] / 2).0;
         let bright = screen.get_pixel(middle[0], middle[1]).0.iter().all(|c| *c > 60);
@@ -136,7 +156,7 @@ fn an_object_is_selected_dragged_and_put_back() {
 
     desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", middle[0], middle[1]));
     let (handle, before) = wait_for("the outline and the gizmo of the selected cube", 30, || {
-        alive(&mut editor);
+        editor.assert_alive();
         let screen = desktop.screenshot();
         let around = outline(&screen)?;
         Some((red_handle(&screen, around)?, around))
@@ -150,21 +170,21 @@ fn an_object_is_selected_dragged_and_put_back() {
         (now[0] > from[0] + 30).then_some(now)
     };
     let after = wait_for("the cube to follow the drag", 30, || {
-        alive(&mut editor);
+        editor.assert_alive();
         moved(before)
     });
     assert!(changed(&still, &desktop.screenshot()) > 2000, "from {before:?} to {after:?}");
 
     desktop.xdotool("key ctrl+z");
     wait_for("undo to put the cube back", 30, || {
-        alive(&mut editor);
+        editor.assert_alive();
         let now = outline(&desktop.screenshot())?;
         now.iter().zip(before).all(|(a, b)| a.abs_diff(b) <= 3).then_some(())
     });
 
     desktop.xdotool("key ctrl+q");
-    let status = wait_for("the editor to quit", 30, || editor.0.try_wait().expect("the process"));
-    let log = read_log();
+    let status = wait_for("the editor to quit", 30, || editor.process.try_wait().expect("the process"));
+    let log = editor.log();
     assert!(status.success(), "{status}\n{log}");
     for word in ["validation", "panicked", "ERROR", "lost"] {
         assert!(!log.contains(word), "the log speaks of '{word}':\n{log}");

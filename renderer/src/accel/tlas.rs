@@ -1,4 +1,4 @@
-//! The top-level structure: one descriptor an instance slot. Refitted when only transforms moved, built anew when the
+//! The top-level structure: one descriptor an instance slot, in spatial order at the last build. Refitted when only transforms moved, built anew when the
 //! count or an active state changed. Hidden instances have mask 0, degenerate ones a null reference.
 
 use std::collections::BTreeMap;
@@ -9,6 +9,8 @@ use caustica_gpu::{
     AccelBuild, AccelGeometry, AccelStructure, Access, BuildMode, BuildPreference, Device, Frames, Recorder,
     ResourceId, SceneSet, Stage, TlasInstances, Use, pack_instance,
 };
+
+use glam::DVec3;
 
 use super::blas::{BlasKey, Scratch};
 use crate::error::{RendererError, Result};
@@ -36,6 +38,8 @@ pub(crate) struct Groups {
 pub(crate) struct Tlas {
     device: Arc<Device>,
     descriptors: Table<Descriptor>,
+    /// Where the descriptor of each slot stands.
+    place_of_slot: Vec<u32>,
     /// Stands for the descriptors in the barrier tracker.
     descriptor_group: ResourceId,
     structure: Option<AccelStructure>,
@@ -50,6 +54,7 @@ impl Tlas {
         Self {
             device: Arc::clone(device),
             descriptors: Table::new(device, "instance descriptors"),
+            place_of_slot: Vec::new(),
             descriptor_group: device.new_resource_id(),
             structure: None,
             active: BTreeMap::new(),
@@ -75,6 +80,7 @@ impl Tlas {
         let mut activity_changed = false;
         if changed.structure {
             let count = tables.instances.slot_count();
+            self.place_slots(count, tables);
             for slot in 0..count {
                 activity_changed |= self.describe(slot, tables, &blas_of);
             }
@@ -101,13 +107,28 @@ impl Tlas {
         Ok(if rebuild { TlasWork::Built } else { TlasWork::Refit })
     }
 
+    /// Gives every slot a place near its neighbours in space.
+    fn place_slots(&mut self, count: u32, tables: &Tables) {
+        let centre = |slot: u32| {
+            let entry = tables.instances.get(slot)?;
+            let mesh = tables.meshes.get(entry.instance.mesh).ok()?;
+            Some(entry.instance.render_from_mesh.transform_point3(mesh.centre).as_dvec3())
+        };
+        let centres: Vec<DVec3> = (0..count).map(|slot| centre(slot).unwrap_or(DVec3::NAN)).collect();
+        self.place_of_slot = vec![0; count as usize];
+        for (place, slot) in crate::tables::order_of(&centres).into_iter().enumerate() {
+            self.place_of_slot[slot as usize] = place as u32;
+        }
+    }
+
     /// Writes one descriptor; true when the slot became active or inactive.
     fn describe(&mut self, slot: u32, tables: &Tables, blas_of: &impl Fn(&BlasKey) -> u64) -> bool {
         let entry = tables.instances.get(slot);
         let descriptor =
             entry.map_or_else(Zeroable::zeroed, |entry| descriptor_of(slot, entry, tables, blas_of));
-        if self.descriptors.get(slot as usize) != Some(&descriptor) {
-            self.descriptors.set(slot as usize, descriptor);
+        let place = self.place_of_slot.get(slot as usize).copied().unwrap_or(slot) as usize;
+        if self.descriptors.get(place) != Some(&descriptor) {
+            self.descriptors.set(place, descriptor);
         }
         let active = descriptor.0[56..] != [0; 8];
         self.active.insert(slot, active) != Some(active)

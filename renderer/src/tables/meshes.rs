@@ -22,6 +22,8 @@ pub(crate) struct GpuMesh {
     geometries: Buffer,
     /// The content, for emissive triangles and statistics.
     pub(crate) host: Arc<Mesh>,
+    /// Middle of its bounds, mesh space.
+    pub(crate) centre: Vec3,
 }
 
 impl GpuMesh {
@@ -103,8 +105,9 @@ impl Meshes {
         let geometries = make("geometries", size_of_val(records.as_slice()))?;
         recorder.upload(&geometries, 0, bytemuck::cast_slice(&records))?;
         let host = Arc::clone(mesh);
+        let centre = centre_of(&host);
         self.by_id
-            .insert(id, GpuMesh { positions, _attributes: attribute_buffer, indices, geometries, host });
+            .insert(id, GpuMesh { positions, _attributes: attribute_buffer, indices, geometries, host, centre });
         Ok(())
     }
 
@@ -126,6 +129,19 @@ pub(crate) fn rows_of(map: &Affine3A) -> Rows {
         [m.x_axis.y, m.y_axis.y, m.z_axis.y, t.y],
         [m.x_axis.z, m.y_axis.z, m.z_axis.z, t.z],
     ]
+}
+
+/// Middle of the bounds of all primitives, mesh space.
+fn centre_of(mesh: &Mesh) -> Vec3 {
+    let placed = mesh.geometries.iter().flat_map(|geometry| {
+        let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
+        let place = geometry.mesh_from_primitive;
+        mesh.indices[range].iter().map(move |i| place.transform_point3(mesh.positions[*i as usize]))
+    });
+    let bounds = placed.fold(None, |bounds: Option<(Vec3, Vec3)>, p| {
+        Some(bounds.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))
+    });
+    bounds.map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5)
 }
 
 /// The mesh with the triangles of each geometry in spatial order.

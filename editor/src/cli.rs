@@ -1,5 +1,10 @@
 //! The command line: what it accepts, and which exit code an error becomes. One file a subcommand.
 
+/// Prints a line to standard output; a reader that has gone away is no error.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::cli::say_line(format_args!($($text)*)) };
+}
+
 mod check;
 mod devices;
 mod output;
@@ -109,6 +114,13 @@ fn demo_project() -> Option<PathBuf> {
     folders.into_iter().map(|folder| folder.join(DEMO)).find(|file| file.is_file())
 }
 
+/// What `say!` does.
+fn say_line(text: std::fmt::Arguments<'_>) {
+    use std::io::Write;
+    // The only thing that can go wrong is that nobody reads any more.
+    let _ = writeln!(std::io::stdout().lock(), "{text}");
+}
+
 /// Runs a subcommand with warnings printed to standard error.
 fn logged(run: impl FnOnce() -> anyhow::Result<ExitCode>) -> anyhow::Result<ExitCode> {
     let filter = tracing_subscriber::EnvFilter::try_from_env("CAUSTICA_LOG")
@@ -125,8 +137,12 @@ fn logged(run: impl FnOnce() -> anyhow::Result<ExitCode>) -> anyhow::Result<Exit
 /// 3 when the device is at fault, else 1.
 fn exit_code_of(error: &anyhow::Error) -> u8 {
     let from_device = error.chain().any(|cause| {
-        cause.downcast_ref::<GpuError>().is_some()
-            || matches!(cause.downcast_ref::<RendererError>(), Some(RendererError::Gpu(_)))
+        let gpu = match cause.downcast_ref::<RendererError>() {
+            Some(RendererError::Gpu(gpu)) => Some(gpu),
+            _ => cause.downcast_ref::<GpuError>(),
+        };
+        // What is larger than any device of this kind takes is the input's fault.
+        gpu.is_some_and(|gpu| !matches!(gpu, GpuError::Limit { .. }))
     });
     if from_device { EXIT_DEVICE } else { EXIT_INPUT }
 }

@@ -62,6 +62,8 @@ pub struct Session {
     camera: ViewCamera,
     selection: BTreeSet<Target>,
     selection_changed: bool,
+    /// The renderer may hold half of a change: it gets the whole scene again.
+    resync: bool,
     device: Arc<Device>,
 }
 
@@ -90,6 +92,7 @@ impl Session {
             camera: ViewCamera::default(),
             selection: BTreeSet::new(),
             selection_changed: false,
+            resync: false,
             device: Arc::clone(device),
         })
     }
@@ -210,8 +213,9 @@ impl Session {
     fn replace_scene(&mut self) -> anyhow::Result<()> {
         let emptied = std::mem::take(&mut self.sync).clear();
         let mut recorder = self.frames.begin()?;
-        self.renderer.apply(&mut recorder, &emptied)?;
+        let applied = self.renderer.apply(&mut recorder, &emptied);
         self.frames.submit(recorder, None)?;
+        applied?;
         self.history.clear();
         self.selection.clear();
         self.selection_changed = true;
@@ -296,10 +300,29 @@ impl Session {
     pub fn begin_frame(&mut self, extent_px: [u32; 2]) -> anyhow::Result<Recorder> {
         let mut recorder = self.frames.begin()?;
         self.renderer.note_times(self.view, &self.frames)?;
+        match self.record(&mut recorder, extent_px) {
+            Ok(()) => Ok(recorder),
+            Err(error) => {
+                // Uploads and builds recorded until then count as done: they must reach the device.
+                self.frames.submit(recorder, None)?;
+                Err(error)
+            }
+        }
+    }
+
+    fn record(&mut self, recorder: &mut Recorder, extent_px: [u32; 2]) -> anyhow::Result<()> {
+        if std::mem::take(&mut self.resync) {
+            self.renderer.apply(recorder, &std::mem::take(&mut self.sync).clear())?;
+            self.document.mark_all_added("tried again");
+        }
         let structure_may_have_changed = self.selection_changed;
         let delta = self.sync.delta(&mut self.document, self.camera.world_from_camera.translation);
         let selection_stale = structure_may_have_changed || !delta.instances.is_empty();
-        self.renderer.apply(&mut recorder, &delta)?;
+        if let Err(error) = self.renderer.apply(recorder, &delta) {
+            // Half of the change is in: the next frame sends the whole scene again.
+            self.resync = true;
+            return Err(error.into());
+        }
         if selection_stale {
             self.renderer.select(self.view, outlined(&self.document, &self.selection).into_iter())?;
             self.selection_changed = false;
@@ -313,8 +336,8 @@ impl Session {
         let view = self.renderer.view_mut(self.view)?;
         view.resize(extent_px);
         view.set_camera(camera);
-        self.renderer.render(&mut recorder, self.view)?;
-        Ok(recorder)
+        self.renderer.render(recorder, self.view)?;
+        Ok(())
     }
 
     /// Starts a frame that leaves the view's image as it was: the window repaints its panels alone.

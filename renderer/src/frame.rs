@@ -30,6 +30,9 @@ pub(crate) fn record(
     if what != Invalidation::Nothing {
         view.bands.abandon();
     }
+    if what == Invalidation::Everything {
+        view.history = None;
+    }
     let plan = Plan::of(view, what, needs);
     let band = view.bands.next(view.extent()[1], plan.moved);
     recorder.set_tag(view.bands.tag(&band));

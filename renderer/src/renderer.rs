@@ -96,7 +96,8 @@ impl Renderer {
     pub fn apply(&mut self, recorder: &mut Recorder, delta: &SceneDelta) -> Result<()> {
         self.tables.settle_transforms();
         if !delta.is_empty() {
-            let changed = self.tables.apply(recorder, delta)?;
+            let changed =
+                self.tables.apply(recorder, delta).inspect_err(|_| self.changed.structure = true)?;
             self.changed.structure |= changed.structure;
             self.changed.moved.extend(changed.moved);
             self.changed.meshes.extend(changed.meshes);
@@ -110,7 +111,11 @@ impl Renderer {
         }
         self.tables.flush(recorder)?;
         let slot = recorder.slot();
-        self.accel.update(recorder, &self.tables, &std::mem::take(&mut self.changed))?;
+        let changed = std::mem::take(&mut self.changed);
+        if let Err(error) = self.accel.update(recorder, &self.tables, &changed) {
+            self.changed = Changed { structure: true, ..changed };
+            return Err(error);
+        }
         self.tables.textures.update_set(slot);
         let Tables { environment, textures, .. } = &mut self.tables;
         environment.update_set(slot, textures.set_of(slot));

@@ -175,6 +175,12 @@ fn an_object_is_selected_dragged_and_put_back() {
     });
     assert!(changed(&still, &desktop.screenshot()) > 2000, "from {before:?} to {after:?}");
 
+    // Away from the handle, which is highlighted as long as it is held.
+    desktop.xdotool(&format!("mousemove {} {}", WINDOW[0] / 4, WINDOW[1] / 2));
+    wait_for("the drag to end", 30, || {
+        let screen = desktop.screenshot();
+        red_handle(&screen, outline(&screen)?)
+    });
     desktop.xdotool("key ctrl+z");
     wait_for("undo to put the cube back", 30, || {
         editor.assert_alive();

@@ -46,7 +46,7 @@ pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             .map(|f| json!({ "severity": format!("{:?}", f.severity).to_lowercase(), "message": f.message }))
             .collect();
         let warnings: Vec<_> = warnings.iter().map(ToString::to_string).collect();
-        println!(
+        say!(
             "{}",
             json!({
                 "file": args.file,
@@ -60,9 +60,9 @@ pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
         );
     } else {
         for finding in &findings {
-            println!("{:?}: {}", finding.severity, finding.message);
+            say!("{:?}: {}", finding.severity, finding.message);
         }
-        println!(
+        say!(
             "{}: {triangles} triangles, {} materials, {} textures, {} import warnings, {} findings, {errors} errors",
             args.file.display(),
             document.materials().count(),

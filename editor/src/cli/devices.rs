@@ -29,7 +29,7 @@ pub(super) fn run(args: &DevicesArgs) -> anyhow::Result<ExitCode> {
         .min_by_key(|c| (c.kind, std::cmp::Reverse(c.device_local_bytes), c.index))
         .map(|c| c.index);
     if args.json {
-        println!("{}", to_json(&candidates, chosen, problem.as_deref()));
+        say!("{}", to_json(&candidates, chosen, problem.as_deref()));
     } else {
         print_table(&candidates, chosen, problem.as_deref());
     }
@@ -67,21 +67,21 @@ fn to_json(candidates: &[Candidate], chosen: Option<usize>, problem: Option<&str
 
 fn print_table(candidates: &[Candidate], chosen: Option<usize>, problem: Option<&str>) {
     if let Some(problem) = problem {
-        println!("{problem}");
+        say!("{problem}");
     } else if candidates.is_empty() {
-        println!("no Vulkan driver is installed (mesa-vulkan-drivers brings one that needs no GPU)");
+        say!("no Vulkan driver is installed (mesa-vulkan-drivers brings one that needs no GPU)");
     }
     for c in candidates {
-        println!("{}: {} ({}, {}, Vulkan {})", c.index, c.name, kind_name(c.kind), c.driver, c.api_version);
-        println!("   {} MiB on the device", c.device_local_bytes >> 20);
+        say!("{}: {} ({}, {}, Vulkan {})", c.index, c.name, kind_name(c.kind), c.driver, c.api_version);
+        say!("   {} MiB on the device", c.device_local_bytes >> 20);
         if !c.is_suitable() {
-            println!("   cannot be used: it lacks {}", c.lacks.join(", "));
+            say!("   cannot be used: it lacks {}", c.lacks.join(", "));
         } else if chosen == Some(c.index) {
-            println!(
+            say!(
                 "   chosen: the first suitable one of the best kind (discrete, integrated, virtual, processor)"
             );
         } else {
-            println!("   suitable");
+            say!("   suitable");
         }
     }
 }

@@ -4,7 +4,17 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use exr::prelude::{AttributeValue, Image, Layer, LayerAttributes, SpecificChannels, Text, WritableImage};
+use exr::prelude::{
+    AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder,
+    SpecificChannels, Text, WritableImage,
+};
+
+/// Whole rows, which every reader takes.
+const ENCODING: Encoding = Encoding {
+    compression: Compression::ZIP16,
+    blocks: Blocks::ScanLines,
+    line_order: LineOrder::Increasing,
+};
 
 /// What is written beside the pixels.
 #[derive(Clone, Debug, Default)]
@@ -85,7 +95,7 @@ pub(super) fn write_exr(
     note("caustica.device", AttributeValue::Text(Text::from(metadata.device.as_str())));
     note("caustica.pipeline", AttributeValue::Text(Text::from(metadata.pipeline)));
     note("caustica.seed", AttributeValue::Text(Text::from(metadata.seed.to_string().as_str())));
-    let layer = Layer::new(size, attributes, exr::prelude::Encoding::FAST_LOSSLESS, channels);
+    let layer = Layer::new(size, attributes, ENCODING, channels);
     make_folder(path)?;
     Image::from_layer(layer).write().to_file(path).with_context(|| path.display().to_string())
 }

@@ -28,7 +28,7 @@ pub(super) struct RenderArgs {
     /// A project, .gltf, .glb or .obj
     file: PathBuf,
     /// Where the image goes: .png (tone mapped) or .exr (radiance)
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT", value_parser = parse_output)]
     output: PathBuf,
     /// How the image is made
     #[arg(long, value_enum)]
@@ -40,10 +40,10 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     samples: Option<u64>,
     /// Seconds to render
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_positive)]
     time: Option<f64>,
     /// Stop at this noise: sqrt(relMSE) estimated from two independent streams, 0.01 is 1 %
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = parse_positive)]
     target_error: Option<f64>,
     /// Name of the camera
     #[arg(long)]
@@ -61,7 +61,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "N")]
     shadow_rays: Option<u32>,
     /// First sample of a set that is rendered in parts
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 47))]
     sample_offset: u64,
     /// Leave out what the scene does not need, or build everything
     #[arg(long, value_enum)]
@@ -108,6 +108,18 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
         [0, _] | [_, 0] => Err(String::from("a side of 0 pixels")),
         size => Ok(size),
     }
+}
+
+fn parse_positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
+        _ => Err(String::from("expected a number above 0")),
+    }
+}
+
+fn parse_output(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    output::kind_of(&path).map(|_| path).map_err(|error| error.to_string())
 }
 
 fn parse_show(text: &str) -> Result<Show, String> {
@@ -173,9 +185,9 @@ pub(super) fn run(
     }
     report_validation(&device)?;
     if args.json {
-        println!("{}", summary(args, session.statistics(), &metadata, &run, noise, loaded_in));
+        say!("{}", summary(args, session.statistics(), &metadata, &run, noise, loaded_in));
     } else {
-        println!(
+        say!(
             "{}: {}x{}, {} samples in {:.2} s ({}), noise {}, {}",
             args.output.display(),
             args.size[0],
@@ -247,7 +259,8 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     progress.set_message("rendering");
     let start = Instant::now();
     let mut frames = Vec::new();
-    while session.samples() < samples && limit.is_none_or(|limit| start.elapsed() < limit) {
+    let in_time = |samples: u64| samples == 0 || limit.is_none_or(|limit| start.elapsed() < limit);
+    while session.samples() < samples && in_time(session.samples()) {
         let recorder = session.begin_frame(args.size)?;
         session.submit(recorder, None)?;
         let times = &session.statistics().passes;

@@ -47,6 +47,8 @@ impl Shading {
             Self::Rays(pipeline) => {
                 scope.rays(recorder, "shading.trace", pipeline, &binds, scope.rows.clone(), has_light)
             }
+            // Once a sample, with its last band.
+            Self::NoRays(_) if scope.rows.end < scope.extent[1] => Ok(()),
             Self::NoRays(pipeline) => scope.compute(recorder, "shading", pipeline, &binds, &[], has_light),
         }
     }

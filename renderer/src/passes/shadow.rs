@@ -44,6 +44,8 @@ impl Shadow {
             Self::Rays(pipeline) => {
                 scope.rays(recorder, "shadow.trace", pipeline, &binds, scope.rows.clone(), 0)
             }
+            // Once a sample, with its last band.
+            Self::NoRays(_) if scope.rows.end < scope.extent[1] => Ok(()),
             Self::NoRays(pipeline) => scope.compute(recorder, "shadow.light", pipeline, &binds, &[], 0),
         }
     }

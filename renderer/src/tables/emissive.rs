@@ -36,13 +36,18 @@ impl Emissive {
         let (mut triangles, mut weights) = (Vec::new(), Vec::new());
         self.instances.clear();
         for (slot, entry) in instances.iter() {
-            if !entry.instance.visible || entry.degenerate {
+            let emitter = entry.instance.materials.iter().any(|id| materials.get(*id).is_some_and(emits));
+            if !emitter || !entry.instance.visible {
+                continue;
+            }
+            // A degenerate emitter is followed too: it may get a size again.
+            self.instances.insert(slot);
+            if entry.degenerate {
                 continue;
             }
             for (geometry, id) in entry.instance.materials.iter().enumerate() {
                 let Some(material) = materials.get(*id).filter(|material| emits(material)) else { continue };
                 let Ok(mesh) = meshes.get(entry.instance.mesh) else { continue };
-                self.instances.insert(slot);
                 let luminance = f64::from(material.emissive.dot(Vec3::new(0.2126, 0.7152, 0.0722)));
                 let place =
                     entry.instance.render_from_mesh * mesh.host.geometries[geometry].mesh_from_primitive;

@@ -106,8 +106,10 @@ impl Meshes {
         recorder.upload(&geometries, 0, bytemuck::cast_slice(&records))?;
         let host = Arc::clone(mesh);
         let centre = centre_of(&host);
-        self.by_id
-            .insert(id, GpuMesh { positions, _attributes: attribute_buffer, indices, geometries, host, centre });
+        self.by_id.insert(
+            id,
+            GpuMesh { positions, _attributes: attribute_buffer, indices, geometries, host, centre },
+        );
         Ok(())
     }
 

@@ -13,8 +13,10 @@ pub(crate) fn sort_triangles(positions: &[Vec3], indices: &mut [u32]) {
         .chunks_exact(3)
         .map(|corner| corner.iter().map(|i| positions[*i as usize].as_dvec3()).sum::<DVec3>() / 3.0)
         .collect();
-    let sorted: Vec<u32> =
-        order_of(&centroids).into_iter().flat_map(|i| indices[i as usize * 3..][..3].iter().copied()).collect();
+    let sorted: Vec<u32> = order_of(&centroids)
+        .into_iter()
+        .flat_map(|i| indices[i as usize * 3..][..3].iter().copied())
+        .collect();
     indices.copy_from_slice(&sorted);
 }
 
@@ -25,7 +27,8 @@ pub(crate) fn order_of(points: &[DVec3]) -> Vec<u32> {
     let high = finite().fold(DVec3::NEG_INFINITY, DVec3::max);
     // One scale for all axes: cells are cubes, whatever the shape of the whole.
     let extent = (high - low).max_element();
-    let scale = if extent > 0.0 && extent.is_finite() { f64::from((1_u32 << BITS) - 1) / extent } else { 0.0 };
+    let scale =
+        if extent > 0.0 && extent.is_finite() { f64::from((1_u32 << BITS) - 1) / extent } else { 0.0 };
     let code = |point: DVec3| if point.is_finite() { morton((point - low) * scale) } else { u64::MAX };
     let mut order: Vec<(u64, u32)> = points.iter().enumerate().map(|(i, p)| (code(*p), i as u32)).collect();
     order.sort_unstable();
@@ -60,7 +63,8 @@ mod tests {
 
     #[test]
     fn the_same_triangles_come_out_near_ones_together() {
-        let positions: Vec<Vec3> = (0..300).map(|i| Vec3::new((i / 3 * 37 % 100) as f32, 0.0, i as f32 * 1e-3)).collect();
+        let positions: Vec<Vec3> =
+            (0..300).map(|i| Vec3::new((i / 3 * 37 % 100) as f32, 0.0, i as f32 * 1e-3)).collect();
         let mut indices: Vec<u32> = (0..300).collect();
         sort_triangles(&positions, &mut indices);
         let xs: Vec<f32> = indices.chunks_exact(3).map(|t| positions[t[0] as usize].x).collect();

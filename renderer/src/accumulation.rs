@@ -72,7 +72,9 @@ impl Accumulation {
         if what == Invalidation::Nothing {
             return;
         }
-        if what >= self.pending {
+        // A change of size follows a move on slow devices; with nothing accumulated since, the move is the reason.
+        let follows = what == Invalidation::Resize && self.samples == 0 && self.resets > 0;
+        if what >= self.pending && !follows {
             reason.clone_into(&mut self.reason);
         }
         self.pending = self.pending.max(what);

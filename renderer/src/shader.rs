@@ -5,6 +5,7 @@ mod compile;
 mod library;
 mod reflect;
 mod sources;
+mod twins;
 
 pub use compile::{SpirvCache, compile};
 pub use library::{Compiled, ShaderLibrary, merge_interfaces};

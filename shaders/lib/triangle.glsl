@@ -106,18 +106,21 @@ Attributes triangle_attributes(Scene scene, uint instance_slot, Triangle triangl
     VertexAttributes a = table.at[triangle.index.x];
     VertexAttributes b = table.at[triangle.index.y];
     VertexAttributes c = table.at[triangle.index.z];
-    vec3 w = vec3(1.0 - barycentric.x - barycentric.y, barycentric);
-    vec3 tangent = w.x * a.tangent.xyz + w.y * b.tangent.xyz + w.z * c.tangent.xyz;
+    // As a + u (b - a) + v (c - a): equal values at the corners come out exactly.
+    float u = barycentric.x;
+    float v = barycentric.y;
+    vec3 tangent = a.tangent.xyz + u * (b.tangent.xyz - a.tangent.xyz) + v * (c.tangent.xyz - a.tangent.xyz);
     if (triangle.moved) {
         tangent = transform_vector(triangle.mesh_from_primitive, tangent);
     }
     Attributes attributes;
-    attributes.normal = triangle_render_normal(scene, instance_slot, triangle, w.x * a.normal + w.y * b.normal + w.z * c.normal);
+    attributes.normal = triangle_render_normal(scene, instance_slot, triangle, a.normal + u * (b.normal - a.normal) + v * (c.normal - a.normal));
     attributes.tangent = transform_vector(triangle.render_from_mesh, tangent);
     attributes.handedness = (a.tangent.w < 0.0 ? -1.0 : 1.0) * triangle.winding; // a mirrored frame changes hands
-    attributes.uv = vec2[2](w.x * a.tex_coord0 + w.y * b.tex_coord0 + w.z * c.tex_coord0,
-        w.x * a.tex_coord1 + w.y * b.tex_coord1 + w.z * c.tex_coord1);
-    attributes.color = w.x * unpack_color(a) + w.y * unpack_color(b) + w.z * unpack_color(c);
+    attributes.uv = vec2[2](a.tex_coord0 + u * (b.tex_coord0 - a.tex_coord0) + v * (c.tex_coord0 - a.tex_coord0),
+        a.tex_coord1 + u * (b.tex_coord1 - a.tex_coord1) + v * (c.tex_coord1 - a.tex_coord1));
+    vec4 color = unpack_color(a);
+    attributes.color = color + u * (unpack_color(b) - color) + v * (unpack_color(c) - color);
     return attributes;
 }
 

@@ -106,3 +106,35 @@ pub fn star_discrepancy(points: &[[f64; 2]]) -> f64 {
     }
     worst
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn even_counts_are_even_and_lopsided_ones_are_not() {
+        assert!(chi_square_deviate(&[100, 103, 98, 99]) < 0.0);
+        assert!(chi_square_deviate(&[200, 100, 50, 50]) > 5.0);
+        assert!(chi_square_deviate_against(&[10, 20, 70, 1], &[10.0, 20.0, 69.0, 2.0]) < 0.5);
+    }
+
+    #[test]
+    fn discrepancy_of_known_sets() {
+        // One point in the middle: the open box up to (1, 1/2) holds nothing, the closed one up to the point too much.
+        assert!((star_discrepancy(&[[0.5, 0.5]]) - 0.75).abs() < 1e-12);
+        // n points in one corner leave the whole square empty.
+        assert!(star_discrepancy(&[[0.999, 0.999]; 4]) > 0.99);
+        let grid: Vec<[f64; 2]> = (0..64)
+            .map(|i| [f64::from(i % 8) / 8.0 + 1.0 / 16.0, f64::from(i / 8) / 8.0 + 1.0 / 16.0])
+            .collect();
+        assert!(star_discrepancy(&grid) < 0.13);
+    }
+
+    #[test]
+    fn correlation_is_one_for_equal_and_none_for_independent_series() {
+        let mut random = Random::new(1);
+        let [a, b] = [0, 1].map(|_| (0..1000).map(|_| random.unit()).collect::<Vec<_>>());
+        assert!((correlation(&a, &a) - 1.0).abs() < 1e-12);
+        assert!(correlation(&a, &b).abs() < 0.15);
+    }
+}

@@ -1,6 +1,5 @@
 //! The renderer against known radiance: formulas, exact edges, exact directions, conservation, scale.
 //! Flat scenes made by hand; every test fails on any validation message.
-#![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
 use std::f64::consts::PI;
 

@@ -307,3 +307,38 @@ fn a_spoilt_emitter_is_counted_dropped_and_forgotten() {
     assert_eq!(studio.statistics().non_finite, 0, "after one clean frame nothing is left");
     assert!(largest_difference(&again, &clean) < 1e-6);
 }
+
+#[test]
+fn a_spoilt_light_leaves_no_trace_in_motion() {
+    let lamp = InstanceId { node: 5000, part: 0 };
+    // So near and so strong that the light of some pixels is infinite, that of others merely absurd.
+    let absurd = Light::Point {
+        position: Vec3::new(-1.0, 0.01, 0.8),
+        intensity: Vec3::splat(1e38),
+        radius_m: 0.0,
+        range_m: f32::INFINITY,
+    };
+    let after_motion = |spoil: bool| {
+        let (mut studio, ball) = studio_of(Pipeline::Hybrid, -0.6, 0.3);
+        studio.frames(2);
+        let mut counted = 0;
+        for step in 0..7_u8 {
+            let mut delta = moved(ball, -0.6 + 0.1 * f32::from(step));
+            match step {
+                0 if spoil => delta.lights.push((lamp, absurd)),
+                1 if spoil => delta.removed_lights.push(lamp),
+                _ => {}
+            }
+            studio.frame(&delta);
+            let display = studio.display();
+            assert!(display.iter().flatten().all(|x| x.is_finite()), "step {step}");
+            counted += display.iter().filter(|pixel| pixel[0] > 0.99).count();
+        }
+        (studio.display(), counted)
+    };
+    let (clean, few) = after_motion(false);
+    let (spoilt, many) = after_motion(true);
+    assert!(many > few + 500, "the absurd light is expected to blind: {few}, {many} white pixels");
+    let differing = clean.iter().zip(&spoilt).filter(|(p, q)| (p[0] - q[0]).abs() > 0.05).count();
+    assert!(differing * 100 < clean.len(), "{differing} of {} pixels still show it", clean.len());
+}

@@ -23,6 +23,9 @@ struct Module {
     types: BTreeMap<u32, (u32, Vec<u32>)>,
 }
 
+/// Names and offsets in bytes.
+type Fields = Vec<(String, usize)>;
+
 const OP_NAME: u32 = 5;
 const OP_MEMBER_NAME: u32 = 6;
 const OP_TYPE_FIRST: u32 = 19;
@@ -102,7 +105,7 @@ impl Module {
     }
 
     /// Structs with a layout: id, name, fields in order.
-    fn structs(&self) -> Vec<(u32, &str, Vec<(String, usize)>)> {
+    fn structs(&self) -> Vec<(u32, &str, Fields)> {
         let mut found = Vec::new();
         for (id, (opcode, members)) in &self.types {
             let Some(name) = self.names.get(id).filter(|_| *opcode == OP_TYPE_STRUCT) else { continue };

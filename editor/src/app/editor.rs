@@ -45,6 +45,8 @@ pub struct Editor {
     audit: Option<(u64, Job<Vec<Finding>>)>,
     /// The question about unsaved changes, while it is shown.
     pub(super) question: Option<Then>,
+    /// Keys pressed in the frame in which a drag ended, for the next one.
+    late_keys: Vec<Action>,
     /// To be done once a save has succeeded.
     pub(super) after_save: Option<Then>,
     pub(super) quit: bool,
@@ -66,6 +68,7 @@ impl Editor {
             waiting: VecDeque::new(),
             audit: None,
             question: None,
+            late_keys: Vec::new(),
             after_save: None,
             quit: false,
             wake,
@@ -170,6 +173,13 @@ impl Editor {
     }
 
     fn take_keys(&mut self, context: &Context) {
+        // A drag that ends in this frame is still open: its keys wait for the next one, or a slow device would lose them.
+        let released = context.input(|input| !input.pointer.primary_down());
+        if self.state.view.drag.is_some() && released {
+            self.late_keys.extend(actions::pressed(context, context.text_edit_focused()));
+            return;
+        }
+        self.state.actions.append(&mut self.late_keys);
         let busy = self.state.view.flying
             || self.state.view.drag.is_some()
             || self.state.palette.is_some()

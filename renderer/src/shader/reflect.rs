@@ -26,9 +26,10 @@ const SCENE_BINDINGS: [(u32, DescriptorType, &str); 3] = [
 /// Reads the interface of a module that `compile` made from `file`.
 ///
 /// # Errors
-/// [`RendererError::Interface`] when a binding does not fit the host's layout.
+/// [`RendererError::Interface`] when a binding or a shared struct does not fit the host's layout.
 pub fn reflect(file: &str, words: &[u32]) -> Result<Reflection> {
     let refuse = |reason: String| RendererError::Interface { file: file.to_owned(), reason };
+    super::twins::check(words).map_err(refuse)?;
     let entry_points = ReflectConfig::new()
         .spv(without_boolean_spec_ops(words))
         .ref_all_rscs(false)

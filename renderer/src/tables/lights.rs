@@ -41,7 +41,7 @@ impl Lights {
         }
         let shining: Vec<Light> =
             self.by_id.values().copied().filter(|light| power_of(light) > 0.0).collect();
-        let entries = alias::build(&shining.iter().map(power_of).collect::<Vec<_>>());
+        let entries = alias::build(&selection_weights(&shining));
         self.table
             .replace(shining.iter().zip(&entries).map(|(light, entry)| pack(light, entry.pdf)).collect());
         self.alias.replace(entries);
@@ -80,6 +80,14 @@ impl Lights {
 
 fn luminance(rgb: Vec3) -> f64 {
     f64::from(rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722)))
+}
+
+/// Probabilities of choosing a light: half by power, half alike. The share of a directional light in the power depends
+/// on the size of the scene, which is not known here; the equal half bounds every sample's weight by twice the number
+/// of lights at any scale.
+fn selection_weights(lights: &[Light]) -> Vec<f64> {
+    let total: f64 = lights.iter().map(power_of).sum();
+    lights.iter().map(|light| 0.5 / lights.len() as f64 + 0.5 * power_of(light) / total).collect()
 }
 
 /// A weight for choosing lights: radiant power of a point light, and of a directional light over a few square metres.

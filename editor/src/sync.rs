@@ -11,8 +11,8 @@ use caustica_renderer::delta::{self, SceneDelta};
 use caustica_scene::{ChangeSet, Document, Environment, MaterialId, MeshId, Target, TextureId};
 use glam::{DAffine3, DVec3};
 
+use convert::{Maps, light_of, material_of, mesh_of, texture_of};
 pub use convert::{camera_of, instance_id};
-use convert::{environment_of, light_of, material_of, mesh_of, texture_of};
 use origin::Extents;
 
 /// What the renderer holds of the document so far.
@@ -27,6 +27,7 @@ pub struct Sync {
     materials: BTreeMap<MaterialId, (usize, Vec<TextureId>)>,
     textures: BTreeMap<TextureId, usize>,
     environment: Option<Environment>,
+    maps: Maps,
 }
 
 /// Assets that one instance uses.
@@ -63,6 +64,10 @@ impl Sync {
     /// Drains the document's changes into a delta; `eye` is the world position of the active view's camera.
     pub fn delta(&mut self, document: &mut Document, eye: DVec3) -> SceneDelta {
         let changes = document.drain_changes();
+        if changes.is_empty() && self.environment.is_some() && self.extents.render_origin(eye) == self.origin
+        {
+            return SceneDelta::default();
+        }
         let mut delta = SceneDelta { reason: changes.reason(), ..SceneDelta::default() };
         self.note_extents(document, &changes);
         let origin = self.extents.render_origin(eye);
@@ -252,7 +257,7 @@ impl Sync {
         }
         let environment = document.effective_environment();
         if self.environment.as_ref() != Some(&environment) {
-            delta.environment = Some(environment_of(&environment));
+            delta.environment = Some(self.maps.environment_of(&environment));
             self.environment = Some(environment);
         }
     }

@@ -64,8 +64,10 @@ impl Accel {
         self.statistics.add_up();
         self.statistics.blas_count = self.blas.len() as u64;
         self.statistics.instance_count = tables.instances.len() as u64;
-        self.statistics.triangle_count = tables.meshes.triangle_count();
-        self.statistics.blas_bytes = self.blas.values().map(Blas::size).sum();
+        if changed.structure {
+            self.statistics.triangle_count = tables.meshes.triangle_count();
+            self.statistics.blas_bytes = self.blas.values().map(Blas::size).sum();
+        }
         Ok(())
     }
 

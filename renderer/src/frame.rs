@@ -51,6 +51,7 @@ pub(crate) fn record(
         recorder.clear_buffer(&view.counters.device);
     }
     let parity = (view.frame_count % 2) as usize;
+    view.seen = Some(parity);
     let (Some((_, targets)), Some(accumulator)) = (&view.targets, &view.accumulator) else {
         return Ok(());
     };

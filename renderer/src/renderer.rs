@@ -34,7 +34,7 @@ pub struct PickHit {
     pub instance: InstanceId,
     /// Which geometry of its mesh.
     pub geometry: u32,
-    /// Distance from the camera along its axis, metres; `None` in an orthographic or ray-traced view.
+    /// Distance from the camera along its axis, metres; `None` in an orthographic view.
     pub distance_m: Option<f32>,
 }
 
@@ -274,33 +274,26 @@ impl Renderer {
     /// When the view was removed, or the device fails.
     pub fn pick(&mut self, frames: &mut Frames, id: ViewId, pixel: [u32; 2]) -> Result<Option<PickHit>> {
         let view = self.view(id)?;
-        let Some((_, targets)) = view.targets.as_ref().filter(|_| view.frame_count > 0) else {
-            return Ok(None);
-        };
+        let (Some((_, targets)), Some(parity)) = (view.targets.as_ref(), view.seen) else { return Ok(None) };
         if (0..2).any(|i| pixel[i] >= view.extent()[i]) {
             return Ok(None);
         }
-        let parity = ((view.frame_count - 1) % 2) as usize;
         let depth = &targets.depth[parity % targets.depth.len()];
         let mut recorder = frames.begin()?;
-        recorder.copy_to_buffer(&targets.id, pixel, [1, 1], &self.picked)?;
+        recorder.copy_to_buffer(&targets.id, pixel, [1, 1], &self.picked, 0)?;
+        recorder.copy_to_buffer(depth, pixel, [1, 1], &self.picked, 16)?;
         frames.submit(recorder, None)?;
         frames.finish()?;
-        let words: Vec<u32> = words_of(&self.picked.mapped()[..16]);
-        let mut recorder = frames.begin()?;
-        recorder.copy_to_buffer(depth, pixel, [1, 1], &self.picked)?;
-        frames.submit(recorder, None)?;
-        frames.finish()?;
-        let depth = f32::from_bits(bytemuck::pod_read_unaligned(&self.picked.mapped()[..4]));
+        let words: Vec<u32> = words_of(&self.picked.mapped()[..20]);
+        let depth = f32::from_bits(words[4]);
         let Some(slot) = words[0].checked_sub(1).and_then(|slot| self.tables.instances.get(slot)) else {
             return Ok(None);
         };
         let matrices = CameraMatrices::of(view.camera(), view.extent());
-        let perspective_raster = !matrices.orthographic && view.settings().pipeline != Pipeline::Raytraced;
         Ok(Some(PickHit {
             instance: slot.id,
             geometry: words[1] & 0x7fff_ffff,
-            distance_m: (perspective_raster && depth > 0.0).then(|| matrices.near_m / depth),
+            distance_m: (!matrices.orthographic && depth > 0.0).then(|| matrices.near_m / depth),
         }))
     }
 
@@ -350,7 +343,7 @@ fn read_image(device: &Arc<Device>, frames: &mut Frames, image: &Image) -> Resul
     let kind = MemoryUse::Staging;
     let host = Buffer::new(device, "read-back", size, BufferUse::General, Location::ReadBack, kind)?;
     let mut recorder = frames.begin()?;
-    recorder.copy_to_buffer(image, [0, 0], [width, height], &host)?;
+    recorder.copy_to_buffer(image, [0, 0], [width, height], &host, 0)?;
     frames.submit(recorder, None)?;
     frames.finish()?;
     Ok(host.mapped().to_vec())

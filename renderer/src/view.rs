@@ -43,6 +43,8 @@ pub struct View {
     pub(crate) previous: Option<CameraMatrices>,
     /// Which history images the temporal pass filled last; `None`: there is no history.
     pub(crate) history: Option<usize>,
+    /// Parity of the G-buffer that was recorded last; `None`: there is none.
+    pub(crate) seen: Option<usize>,
     /// The window's image of the last size, shown until the first sample of the new size is complete.
     last_window: Option<Image>,
     /// Frames rendered; its parity chooses among the history images.
@@ -96,6 +98,7 @@ impl View {
             counters: Counters { device: counter(Location::Device)?, host },
             previous: None,
             history: None,
+            seen: None,
             last_window: None,
             frame_count: 0,
             bands: Bands::default(),
@@ -202,6 +205,7 @@ impl View {
         }
         self.previous = None;
         self.history = None;
+        self.seen = None;
         self.bands.abandon();
     }
 

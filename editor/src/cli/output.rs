@@ -92,7 +92,9 @@ pub(super) fn write_exr(
         AttributeValue::Text(Text::from(metadata.sample_offset.to_string().as_str())),
     );
     note("caustica.seconds", AttributeValue::F64(metadata.seconds));
-    note("caustica.device", AttributeValue::Text(Text::from(metadata.device.as_str())));
+    // EXR texts hold Latin-1 only.
+    let device = Text::new_or_none(&metadata.device).unwrap_or_else(|| Text::from("unknown"));
+    note("caustica.device", AttributeValue::Text(device));
     note("caustica.pipeline", AttributeValue::Text(Text::from(metadata.pipeline)));
     note("caustica.seed", AttributeValue::Text(Text::from(metadata.seed.to_string().as_str())));
     let layer = Layer::new(size, attributes, ENCODING, channels);

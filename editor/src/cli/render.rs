@@ -67,7 +67,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_enum)]
     needs: Option<NeedsArg>,
     /// Exposure in stops
-    #[arg(long, value_name = "EV", allow_negative_numbers = true)]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = parse_finite)]
     exposure: Option<f32>,
     /// Tone map of a PNG
     #[arg(long, value_enum)]
@@ -114,6 +114,13 @@ fn parse_positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
         _ => Err(String::from("expected a number above 0")),
+    }
+}
+
+fn parse_finite(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        _ => Err(String::from("expected a number")),
     }
 }
 

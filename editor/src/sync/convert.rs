@@ -157,27 +157,49 @@ pub fn light_of(light: &Placed<scene::Light>, origin: DVec3) -> delta::Light {
     }
 }
 
-/// What surrounds the scene. A file that could not be read is black.
-pub fn environment_of(environment: &scene::Environment) -> delta::Environment {
-    match environment {
-        scene::Environment::Constant(radiance) => delta::Environment::Constant(*radiance),
-        scene::Environment::Auto | scene::Environment::DefaultSky => delta::Environment::Equirectangular {
-            map: Arc::new(default_sky()),
-            rotation_rad: 0.0,
-            scale: 1.0,
-        },
-        scene::Environment::File(file) => match &file.map {
-            Some(map) => delta::Environment::Equirectangular {
-                map: Arc::new(delta::RadianceMap {
+/// Environment maps as the renderer wants them, made once.
+#[derive(Default)]
+pub struct Maps {
+    sky: Option<Arc<delta::RadianceMap>>,
+    file: Option<(Arc<scene::RadianceMap>, Arc<delta::RadianceMap>)>,
+}
+
+impl Maps {
+    /// What surrounds the scene. A file that could not be read is black.
+    pub fn environment_of(&mut self, environment: &scene::Environment) -> delta::Environment {
+        match environment {
+            scene::Environment::Constant(radiance) => delta::Environment::Constant(*radiance),
+            scene::Environment::Auto | scene::Environment::DefaultSky => {
+                delta::Environment::Equirectangular {
+                    map: Arc::clone(self.sky.get_or_insert_with(|| Arc::new(default_sky()))),
+                    rotation_rad: 0.0,
+                    scale: 1.0,
+                }
+            }
+            scene::Environment::File(file) => match &file.map {
+                Some(map) => delta::Environment::Equirectangular {
+                    map: self.converted(map),
+                    rotation_rad: file.rotation_rad,
+                    scale: file.scale,
+                },
+                None => delta::Environment::Constant(Vec3::ZERO),
+            },
+        }
+    }
+
+    fn converted(&mut self, map: &Arc<scene::RadianceMap>) -> Arc<delta::RadianceMap> {
+        match &self.file {
+            Some((source, converted)) if Arc::ptr_eq(source, map) => Arc::clone(converted),
+            _ => {
+                let converted = Arc::new(delta::RadianceMap {
                     name: map.name.clone(),
                     width: map.width,
                     height: map.height,
                     rgb: map.rgb.clone(),
-                }),
-                rotation_rad: file.rotation_rad,
-                scale: file.scale,
-            },
-            None => delta::Environment::Constant(Vec3::ZERO),
-        },
+                });
+                self.file = Some((Arc::clone(map), Arc::clone(&converted)));
+                converted
+            }
+        }
     }
 }

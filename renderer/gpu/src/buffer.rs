@@ -8,7 +8,7 @@ use gpu_allocator::MemoryLocation;
 use crate::Result;
 use crate::barrier::ResourceId;
 use crate::context::Device;
-use crate::error::Context;
+use crate::error::{Context, GpuError};
 use crate::memory::{Memory, MemoryUse};
 use crate::retire::Garbage;
 
@@ -60,15 +60,18 @@ impl Buffer {
         kind: MemoryUse,
     ) -> Result<Self> {
         let size = size.max(4);
+        let limit = device.limits().max_buffer_bytes;
+        if size >= limit {
+            return Err(GpuError::Limit { what: format!("buffer '{name}' in bytes"), asked: size, limit });
+        }
         let info = vk::BufferCreateInfo::default().size(size).usage(usage_flags(usage));
         // SAFETY: plain creation; destroyed through the retire queue.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.during("vkCreateBuffer")?;
         // SAFETY: `raw` was just made.
         let mut requirements = unsafe { device.raw.get_buffer_memory_requirements(raw) };
-        if usage == BufferUse::AccelStorage || usage == BufferUse::General {
-            // Scratch and shader binding tables start at addresses that some devices want aligned.
-            requirements.alignment = requirements.alignment.max(256);
-        }
+        // Scratch starts at addresses that some devices want aligned; transforms of a BLAS build lie on 16 bytes.
+        let alignment = if usage == BufferUse::Geometry { 16 } else { 256 };
+        requirements.alignment = requirements.alignment.max(alignment);
         let memory_location = match location {
             Location::Device => MemoryLocation::GpuOnly,
             Location::Upload => MemoryLocation::CpuToGpu,

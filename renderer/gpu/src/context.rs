@@ -51,6 +51,10 @@ pub struct Limits {
     pub max_primitives: u64,
     /// Bytes of push constants.
     pub max_push_constants: u32,
+    /// A buffer of this many bytes is too large.
+    pub max_buffer_bytes: u64,
+    /// Bits of a timestamp that count.
+    pub timestamp_mask: u64,
 }
 
 /// A device with one queue for graphics, compute and transfer.
@@ -111,7 +115,7 @@ impl Device {
             tracker: Mutex::new(Tracker::default()),
             next_resource: AtomicU64::new(1),
             pipeline_cache,
-            limits: limits_of(fns, candidate.physical),
+            limits: Limits { timestamp_mask: candidate.timestamp_mask, ..limits_of(fns, candidate.physical) },
             candidate,
             raw,
             instance: Arc::clone(instance),
@@ -257,9 +261,15 @@ fn create(instance: &Instance, candidate: &Candidate) -> Result<ash::Device> {
 fn limits_of(fns: &ash::Instance, physical: vk::PhysicalDevice) -> Limits {
     let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
     let mut rt = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
+    let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
     let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
-    let mut head =
-        vk::PhysicalDeviceProperties2::default().push_next(&mut accel).push_next(&mut rt).push_next(&mut v12);
+    let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+    let mut head = vk::PhysicalDeviceProperties2::default()
+        .push_next(&mut accel)
+        .push_next(&mut rt)
+        .push_next(&mut v12)
+        .push_next(&mut v11)
+        .push_next(&mut v13);
     // SAFETY: the extensions that define the structures were checked when the device was chosen.
     unsafe { fns.get_physical_device_properties2(physical, &mut head) };
     let core = head.properties.limits;
@@ -275,10 +285,15 @@ fn limits_of(fns: &ash::Instance, physical: vk::PhysicalDevice) -> Limits {
             .max_per_stage_descriptor_update_after_bind_sampled_images
             .min(v12.max_per_stage_descriptor_update_after_bind_samplers)
             .min(v12.max_descriptor_set_update_after_bind_sampled_images)
+            .min(v12.max_descriptor_set_update_after_bind_samplers)
+            .saturating_sub(1)
             .min(16_384),
-        max_instances: accel.max_instance_count,
+        // The custom index of an instance has 24 bits.
+        max_instances: accel.max_instance_count.min(1 << 24),
         max_geometries: accel.max_geometry_count,
         max_primitives: accel.max_primitive_count,
         max_push_constants: core.max_push_constants_size,
+        max_buffer_bytes: v13.max_buffer_size.min(v11.max_memory_allocation_size),
+        timestamp_mask: u64::MAX,
     }
 }

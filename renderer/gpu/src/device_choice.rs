@@ -46,6 +46,8 @@ pub struct Candidate {
     pub(crate) memory_budget: bool,
     /// Whether VK_KHR_swapchain is there.
     pub(crate) swapchain: bool,
+    /// Bits of a timestamp that count.
+    pub(crate) timestamp_mask: u64,
 }
 
 impl Candidate {
@@ -92,11 +94,12 @@ pub(crate) fn choose(instance: &Instance, requirements: &Requirements) -> Result
     if candidates.is_empty() {
         return Err(GpuError::NoDevice { refusals: String::from("no Vulkan driver is installed") });
     }
+    let count = candidates.len();
     let wanted = |candidate: &Candidate| match &requirements.device {
         None => true,
         Some(text) => match text.parse::<usize>() {
-            Ok(index) => candidate.index == index,
-            Err(_) => candidate.name.to_lowercase().contains(&text.to_lowercase()),
+            Ok(index) if index < count => candidate.index == index,
+            _ => candidate.name.to_lowercase().contains(&text.to_lowercase()),
         },
     };
     let refusals = candidates
@@ -150,6 +153,9 @@ fn examine(
         lacks.push(String::from("a window surface (VK_KHR_swapchain)"));
     }
     let queue_family = universal_queue_family(raw, physical);
+    if !filters_floats(raw, physical) {
+        lacks.push(String::from("linear filtering of 32-bit float images (the environment)"));
+    }
     if queue_family.is_none() {
         lacks.push(String::from("a queue for graphics and compute"));
     }
@@ -162,7 +168,8 @@ fn examine(
         .unwrap_or(0);
     Ok(Candidate {
         physical,
-        queue_family: queue_family.unwrap_or(0),
+        queue_family: queue_family.map_or(0, |(index, _)| index),
+        timestamp_mask: queue_family.map_or(0, |(_, bits)| u64::MAX >> (64 - bits.clamp(1, 64))),
         index,
         name: properties.device_name_as_c_str().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
         driver,
@@ -186,14 +193,20 @@ fn examine(
     })
 }
 
-fn universal_queue_family(raw: &ash::Instance, physical: vk::PhysicalDevice) -> Option<u32> {
+/// Index of the first family that can do everything, and the bits of its timestamps.
+fn universal_queue_family(raw: &ash::Instance, physical: vk::PhysicalDevice) -> Option<(u32, u32)> {
     // SAFETY: a plain query.
     let families = unsafe { raw.get_physical_device_queue_family_properties(physical) };
     let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-    families
-        .iter()
-        .position(|f| f.queue_flags.contains(wanted) && f.timestamp_valid_bits > 0)
-        .map(|i| i as u32)
+    let found = families.iter().position(|f| f.queue_flags.contains(wanted) && f.timestamp_valid_bits > 0)?;
+    Some((found as u32, families[found].timestamp_valid_bits))
+}
+
+fn filters_floats(raw: &ash::Instance, physical: vk::PhysicalDevice) -> bool {
+    // SAFETY: a plain query.
+    let properties =
+        unsafe { raw.get_physical_device_format_properties(physical, vk::Format::R32G32B32A32_SFLOAT) };
+    properties.optimal_tiling_features.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR)
 }
 
 fn driver_name(raw: &ash::Instance, physical: vk::PhysicalDevice) -> String {
@@ -234,6 +247,7 @@ pub(crate) fn with_features<R>(
         .host_query_reset(fill);
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(fill)
+        .full_draw_index_uint32(fill)
         .geometry_shader(fill)
         .sampler_anisotropy(fill)
         .independent_blend(fill)
@@ -263,6 +277,7 @@ pub(crate) fn with_features<R>(
         ("partially bound descriptors", v12.descriptor_binding_partially_bound),
         ("host query reset", v12.host_query_reset),
         ("64-bit integers in shaders", core.shader_int64),
+        ("32-bit vertex indices", core.full_draw_index_uint32),
         ("primitive ids in fragment shaders (geometryShader)", core.geometry_shader),
         ("anisotropic filtering", core.sampler_anisotropy),
         ("independent blending", core.independent_blend),

@@ -137,7 +137,7 @@ impl Frames {
             if let Ok(mut tracker) = device.tracker.lock() {
                 tracker.roll_back();
             }
-            return Err(self.name_the_pass(index, error));
+            return Err(self.name_the_pass((index + 1) % IN_FLIGHT, error));
         }
         if let Ok(mut tracker) = device.tracker.lock() {
             tracker.commit();
@@ -172,7 +172,7 @@ impl Frames {
             return Ok(());
         }
         if let Err(error) = self.device.wait_for(value, HUNG_AFTER_S) {
-            return Err(self.name_the_pass(index, error));
+            return Err(self.name_the_pass(self.next, error));
         }
         if let Some(timers) = &self.slots[index].timers {
             let passes = timers.read();
@@ -183,11 +183,15 @@ impl Frames {
         Ok(())
     }
 
-    /// Puts the name of the last pass into an error about a lost or hung device.
-    fn name_the_pass(&self, index: usize, error: GpuError) -> GpuError {
-        let (last, next) = match &self.slots[index].timers {
-            Some(timers) => timers.last_finished(),
-            None => return error,
+    /// Puts the name of the last pass into an error about a lost or hung device: that of the oldest frame that has not
+    /// finished. `oldest`: the slot that was submitted first.
+    fn name_the_pass(&self, oldest: usize, error: GpuError) -> GpuError {
+        let by_age = (0..IN_FLIGHT).map(|step| &self.slots[(oldest + step) % IN_FLIGHT]);
+        let names: Vec<_> =
+            by_age.filter_map(|slot| slot.timers.as_ref()).map(Timers::last_finished).collect();
+        let unfinished = names.iter().find(|(_, next)| next != "none");
+        let Some((last, next)) = unfinished.or(names.last()).cloned() else {
+            return error;
         };
         match error {
             GpuError::DeviceLost { .. } => lost(&last, &next),

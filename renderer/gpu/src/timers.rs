@@ -96,7 +96,8 @@ impl Timers {
             if pair[0][1] == 0 || pair[1][1] == 0 {
                 continue;
             }
-            let ms = pair[1][0].wrapping_sub(pair[0][0]) as f64 * period_ns * 1e-6;
+            let ticks = pair[1][0].wrapping_sub(pair[0][0]) & self.device.limits().timestamp_mask;
+            let ms = ticks as f64 * period_ns * 1e-6;
             match times.iter_mut().find(|time| time.label == *label) {
                 Some(time) => time.ms += ms,
                 None => times.push(PassTime { label: label.clone(), ms }),
@@ -107,6 +108,9 @@ impl Timers {
 
     /// Labels of the last pass whose end was reached and of the one after it.
     pub(crate) fn last_finished(&self) -> (String, String) {
+        if self.labels.is_empty() {
+            return (String::from("none"), String::from("none"));
+        }
         let mut ticks = vec![[0_u64; 2]; self.labels.len() * 2];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
         // SAFETY: the slice holds two 64-bit words a query. NOT_READY fills the availability words all the same.

@@ -50,7 +50,10 @@ fn compare(structs: &Structs, id: u32, twin: &Twin) -> Result<(), String> {
             (expected, found) => {
                 let expected = expected.map_or_else(|| String::from("its end"), |(f, o)| place(f, *o));
                 let found = found.map_or_else(|| String::from("its end"), |(f, o)| place(f, *o));
-                return Err(format!("struct {}: the host expects {expected}, the shader has {found}", twin.name));
+                return Err(format!(
+                    "struct {}: the host expects {expected}, the shader has {found}",
+                    twin.name
+                ));
             }
         }
     }
@@ -82,6 +85,7 @@ fn read(words: &[u32]) -> Structs {
 
 /// A literal string: UTF-8, four bytes a word, ended by a zero.
 fn text_of(words: &[u32]) -> String {
-    let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).take_while(|byte| *byte != 0).collect();
+    let bytes: Vec<u8> =
+        words.iter().flat_map(|word| word.to_le_bytes()).take_while(|byte| *byte != 0).collect();
     String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -24,6 +24,8 @@ pub(crate) struct EnvironmentTable {
     radiance: Vec3,
     rotation_rad: f32,
     is_map: bool,
+    /// What the image and the alias table hold; turning or dimming it uploads nothing.
+    map: Option<Arc<RadianceMap>>,
     stale: Vec<bool>,
 }
 
@@ -49,6 +51,7 @@ impl EnvironmentTable {
             radiance: Vec3::ZERO,
             rotation_rad: 0.0,
             is_map: false,
+            map: None,
             stale: vec![true; Frames::in_flight()],
         })
     }
@@ -62,13 +65,16 @@ impl EnvironmentTable {
                 self.is_map = false;
             }
             Environment::Equirectangular { map, rotation_rad, scale } => {
-                self.image = upload(&self.device, recorder, map.width, map.height, &map.rgb)?;
+                if !self.map.as_ref().is_some_and(|held| Arc::ptr_eq(held, map)) {
+                    self.image = upload(&self.device, recorder, map.width, map.height, &map.rgb)?;
+                    self.alias.replace(alias::build(&weights_of(map)));
+                    self.stale.fill(true);
+                    self.map = Some(Arc::clone(map));
+                }
                 self.grid = (map.width, map.height);
                 self.radiance = Vec3::splat(*scale);
                 self.rotation_rad = *rotation_rad;
                 self.is_map = true;
-                self.alias.replace(alias::build(&weights_of(map)));
-                self.stale.fill(true);
             }
         }
         Ok(())

@@ -68,14 +68,18 @@ void main() {
         return;
     }
     ivec2 at = ivec2(pixel);
-    vec3 color;
+    vec3 color = vec3(0.0);
     switch (push.argument0) {
         case SHOW_NORMAL:
         case SHOW_GEOMETRIC_NORMAL:
         case SHOW_INSTANCE:
         case SHOW_MATERIAL:
         case SHOW_TRIANGLE: color = show_uint(texelFetch(source_uint, at, 0)); break;
-        default: color = show_float(frame, texelFetch(source, at, 0)); break;
+        default: // a target that was left out is stood in for by one texel: what does not exist is black
+            if (textureSize(source, 0) == ivec2(frame.extent_px)) {
+                color = show_float(frame, texelFetch(source, at, 0));
+            }
+            break;
     }
     imageStore(display, at, vec4(is_finite(color) ? clamp(color, 0.0, 1.0) : vec3(1.0, 0.0, 1.0), 1.0));
 }

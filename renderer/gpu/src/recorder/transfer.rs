@@ -141,7 +141,7 @@ impl Recorder {
         }
     }
 
-    /// Copies a rectangle of an image into a buffer, tightly packed from its start.
+    /// Copies a rectangle of an image into a buffer, tightly packed from `target_offset` on.
     ///
     /// # Errors
     /// [`GpuError::Limit`] when the rectangle lies outside the image or the buffer is too small.
@@ -151,11 +151,12 @@ impl Recorder {
         origin: [u32; 2],
         extent: [u32; 2],
         target: &Buffer,
+        target_offset: u64,
     ) -> Result<()> {
         let inside =
             (0..2).all(|i| origin[i].checked_add(extent[i]).is_some_and(|end| end <= image.extent()[i]));
         let bytes = u64::from(extent[0]) * u64::from(extent[1]) * image.desc().format.texel_bytes();
-        if !inside || bytes > target.size() {
+        if !inside || bytes.saturating_add(target_offset) > target.size() {
             return Err(GpuError::Limit {
                 what: String::from("read-back"),
                 asked: bytes,
@@ -167,6 +168,7 @@ impl Recorder {
             Use::Buffer(target, Stage::Transfer, Access::TransferWrite),
         ]);
         let region = [vk::BufferImageCopy::default()
+            .buffer_offset(target_offset)
             .image_subresource(level(image, 0))
             .image_offset(vk::Offset3D { x: origin[0] as i32, y: origin[1] as i32, z: 0 })
             .image_extent(vk::Extent3D { width: extent[0], height: extent[1], depth: 1 })];

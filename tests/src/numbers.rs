@@ -75,6 +75,11 @@ fn chi_square_to_normal(statistic: f64, freedom: f64) -> f64 {
     ((statistic / freedom).cbrt() - (1.0 - spread)) / spread.sqrt()
 }
 
+/// Whether two numbers are nearer than `bound`; a NaN is near nothing.
+pub fn is_near(a: f64, b: f64, bound: f64) -> bool {
+    (a - b).abs() < bound
+}
+
 /// Pearson's correlation of two series of the same length.
 pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len() as f64;

@@ -177,18 +177,12 @@ fn faults_of_the_input_end_with_1_and_name_the_file() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("broken.gltf"), "{ \"asset\": ").expect("a file");
     std::fs::write(folder.path().join("text.xyz"), "nothing").expect("a file");
-    for (file, output) in [
-        ("missing.glb", "a.png"),
-        ("broken.gltf", "a.png"),
-        ("text.xyz", "a.png"),
-        (gallery().as_str(), "a.jpg"),
-    ] {
+    for file in ["missing.glb", "broken.gltf", "text.xyz"] {
         let run =
-            caustica(folder.path(), &["render", file, "-o", output, "--size", "16x16", "--samples", "1"]);
+            caustica(folder.path(), &["render", file, "-o", "a.png", "--size", "16x16", "--samples", "1"]);
         assert_eq!(run.code, Some(1), "{file}: {}", run.stderr);
-        let named = if output == "a.jpg" { output } else { file };
-        assert!(run.stderr.contains(named), "{named} in: {}", run.stderr);
-        assert!(run.stdout.is_empty() && !folder.path().join(output).exists());
+        assert!(run.stderr.contains(file), "{file} in: {}", run.stderr);
+        assert!(run.stdout.is_empty() && !folder.path().join("a.png").exists());
     }
     let check = caustica(folder.path(), &["check", "broken.gltf"]);
     assert_eq!(check.code, Some(1), "{}{}", check.stdout, check.stderr);
@@ -201,6 +195,7 @@ fn wrong_usage_ends_with_2() {
     for arguments in [
         vec!["render"],
         vec!["render", &gallery],
+        vec!["render", &gallery, "-o", "a.jpg"],
         vec!["render", &gallery, "-o", "a.png", "--size", "0x10"],
         vec!["render", &gallery, "-o", "a.png", "--samples", "0"],
         vec!["render", &gallery, "-o", "a.png", "--pipeline", "magic"],

@@ -257,10 +257,9 @@ fn the_pass_drops_and_counts_what_is_not_finite() {
     let bytes = pass.read(&mut session, &pass.accumulator);
     let sums: Vec<AccumulatorPixel> = bytes.chunks_exact(96).map(bytemuck::pod_read_unaligned).collect();
     for (pixel, sum) in sums.iter().enumerate().take(pixels) {
-        for channel in 0..4 {
+        for (channel, expected) in exact[pixel].into_iter().enumerate() {
             let parts = sum.stream.iter().flat_map(|s| [s.block[channel], s.high[channel], s.low[channel]]);
             let total: f64 = parts.map(f64::from).sum();
-            let expected = exact[pixel][channel];
             assert!(
                 (total - expected).abs() <= 1e-6 * expected,
                 "pixel {pixel}, channel {channel}: {total} {expected}"

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use caustica_tests::compute::{Snippet, run};
 use caustica_tests::gpu::session;
+use caustica_tests::numbers::is_near;
 use glam::DVec3;
 
 const SIDE: usize = 16;
@@ -122,7 +123,7 @@ fn ggx_reflects_what_it_should_at_every_roughness_and_angle() {
             assert!(row[5] < 1.02, "{label}: the density integrates to {}", row[5]);
             assert!((f64::from(row[6]) - expected).abs() < 0.03, "{label}: integrated {} {expected}", row[6]);
         }
-        naive_broken += usize::from(!((f64::from(row[4]) - expected).abs() < 0.1));
+        naive_broken += usize::from(!is_near(f64::from(row[4]), expected, 0.1));
     }
     assert!(naive_broken > SIDE, "the naive form is expected to lose energy or its digits: {naive_broken}");
 }

@@ -4,7 +4,7 @@
 use caustica_renderer::gpu_types::AliasEntry;
 use caustica_tests::compute::{Snippet, bytes, run};
 use caustica_tests::gpu::session;
-use caustica_tests::numbers::{Random, chi_square_deviate_against};
+use caustica_tests::numbers::{Random, chi_square_deviate_against, is_near};
 
 const INCLUDES: &[&str] = &["lib/random.glsl", "lib/light_sampling.glsl"];
 
@@ -81,7 +81,7 @@ fn sphere_lights_are_exact_from_far_and_near() {
         assert!(at(6) < blurred, "{label}: {} of the samples miss their light", at(6));
         assert!(at(7) < 1e-3, "{label}: {} between sampling and meeting", at(7));
         assert!(at(8) < 1e-5, "{label}: {} off the surface", at(8));
-        naive_broken += usize::from(!((at(10) * solid_angle - 1.0).abs() < 0.01));
+        naive_broken += usize::from(!is_near(at(10) * solid_angle, 1.0, 0.01));
     }
     assert!(naive_broken > COUNT / 3, "the naive density is expected to break: {naive_broken}");
 }

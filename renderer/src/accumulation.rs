@@ -74,7 +74,7 @@ impl Accumulation {
         }
         // A change of size follows a move on slow devices; with nothing accumulated since, the move is the reason.
         let follows = what == Invalidation::Resize && self.samples == 0 && self.resets > 0;
-        if what >= self.pending && !follows {
+        if what > self.pending && !follows {
             reason.clone_into(&mut self.reason);
         }
         self.pending = self.pending.max(what);

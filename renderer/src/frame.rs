@@ -1,6 +1,6 @@
 //! The order of the passes, from top to bottom. Enters: a view and the scene. Leaves: its display image.
 
-use caustica_gpu::{Access, Recorder, Stage, Use};
+use caustica_gpu::Recorder;
 use glam::{Mat4, Vec2};
 
 use crate::accel::Accel;
@@ -47,7 +47,7 @@ pub(crate) fn record(
         extent: view.extent(),
         rows: band.rows.clone(),
     };
-    if constants.accumulated == 0 {
+    if constants.accumulated == 0 && band.first {
         recorder.clear_buffer(&view.counters.device);
     }
     let parity = (view.frame_count % 2) as usize;
@@ -64,7 +64,7 @@ pub(crate) fn record(
     }
     let filled = view.history.map_or(0, |filled| 1 - filled);
     if let Some(temporal) = passes.temporal.as_ref().filter(|_| plan.moving) {
-        temporal.record(recorder, &scope, targets, parity, filled)?;
+        temporal.record(recorder, &scope, targets, parity, filled, &view.counters.device)?;
     }
     let light = match (&targets.history, plan.moving) {
         (Some(history), true) => Some((&history.diffuse[filled], &history.specular[filled])),
@@ -205,9 +205,4 @@ pub(crate) fn read_counters(view: &mut View, slot: usize) {
     if let Some(word) = host.mapped().first_chunk::<4>() {
         view.statistics.non_finite = u64::from(u32::from_ne_bytes(*word));
     }
-}
-
-/// The uses of a host that reads an accumulator.
-pub(crate) fn read_use(buffer: &caustica_gpu::Buffer) -> Use<'_> {
-    Use::Buffer(buffer, Stage::Transfer, Access::TransferRead)
 }

@@ -5,7 +5,7 @@ use caustica_gpu::Specialization;
 
 use crate::delta::{Material, ShadingMode};
 use crate::measure::LeftOut;
-use crate::settings::{NeedsMode, Pipeline, ViewSettings};
+use crate::settings::{NeedsMode, Pipeline, Show, ViewSettings};
 use crate::tables::{emits, has_alpha, is_opaque, transmits};
 
 /// What a scene holds, as far as it decides what is needed.
@@ -98,6 +98,8 @@ pub struct Needs {
     pub shadow_rays: bool,
     /// The temporal pass.
     pub temporal: bool,
+    /// Motion vectors.
+    pub motion: bool,
 }
 
 impl Needs {
@@ -126,6 +128,7 @@ impl Needs {
             alpha: all || scene.alpha,
             shadow_rays: rays,
             temporal: settings.temporal && rays && (all || noisy),
+            motion: all || settings.show == Show::Motion || (settings.temporal && rays && noisy),
         }
     }
 
@@ -152,6 +155,7 @@ impl Needs {
             self.refraction,
             self.emission,
             self.shadow_rays,
+            self.motion,
         ];
         Specialization {
             values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),
@@ -171,7 +175,7 @@ impl Needs {
                 nothing
             }
         };
-        let list: [(bool, &str, &str); 12] = [
+        let list: [(bool, &str, &str); 13] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -190,6 +194,7 @@ impl Needs {
             ),
             (rays && self.refraction, "refraction rays", why_no_secondary("no surface lets light pass")),
             (self.emission, "emissive target", "no surface emits"),
+            (self.motion, "motion vectors", "nothing is denoised over time"),
             (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),
             (
                 self.temporal,

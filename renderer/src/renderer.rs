@@ -1,5 +1,6 @@
 //! The renderer: apply a delta, render a view, read it back. Owns the scene on the device and the views.
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -178,7 +179,7 @@ impl Renderer {
         let view = self.view(id)?;
         let settings = view.settings().clone();
         let needs = Needs::of(&self.summary, &settings);
-        self.prepare_passes(settings.pipeline, needs, recorder.slot())?;
+        self.prepare_passes(needs, id, recorder.slot())?;
         let (Some(view), Some(passes)) =
             (self.views.get_mut(&id), self.passes.get(&(settings.pipeline, needs)))
         else {
@@ -217,10 +218,9 @@ impl Renderer {
         Ok(self.view(id)?.statistics())
     }
 
-    fn prepare_passes(&mut self, pipeline: Pipeline, needs: Needs, frame_slot: usize) -> Result<()> {
-        if self.passes.contains_key(&(pipeline, needs)) {
-            return Ok(());
-        }
+    fn prepare_passes(&mut self, needs: Needs, id: ViewId, frame_slot: usize) -> Result<()> {
+        let view = self.view(id)?;
+        let (pipeline, show, window) = (view.settings().pipeline, view.settings().show, view.is_for_window());
         let mut builder = Builder {
             device: &self.device,
             library: &mut self.library,
@@ -228,9 +228,11 @@ impl Renderer {
             needs,
             specialization: needs.specialization(),
         };
-        let passes = PassSet::new(&mut builder, pipeline)?;
-        self.passes.insert((pipeline, needs), passes);
-        Ok(())
+        let passes = match self.passes.entry((pipeline, needs)) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => entry.insert(PassSet::new(&mut builder, pipeline)?),
+        };
+        passes.post.prepare(&mut builder, show, window)
     }
 
     /// Reads the accumulated image of a view. Waits for the device.
@@ -246,7 +248,6 @@ impl Renderer {
             Buffer::new(&self.device, "read-back", size, BufferUse::General, Location::ReadBack, kind)?;
         let mut recorder = frames.begin()?;
         let slot = recorder.slot();
-        recorder.declare(&[frame::read_use(accumulator)]);
         recorder.copy_buffer(accumulator, &host, size)?;
         let counters = &self.view(id)?.counters;
         recorder.copy_buffer(&counters.device, &counters.host[slot % counters.host.len()], 16)?;

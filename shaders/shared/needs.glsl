@@ -13,5 +13,6 @@ layout(constant_id = 6) const bool NEEDS_REFLECTION = true;          // any surf
 layout(constant_id = 7) const bool NEEDS_REFRACTION = true;          // any surface transmits
 layout(constant_id = 8) const bool NEEDS_EMISSION = true;            // any material emits or is unlit
 layout(constant_id = 9) const bool NEEDS_SHADOW_RAYS = true;         // false in the raster pipeline
+layout(constant_id = 10) const bool NEEDS_MOTION = true;             // motion vectors are read
 
 #endif

@@ -18,7 +18,9 @@ fn write_scene(folder: &Path, shift: f64) -> String {
     scene["nodes"][0]["translation"] = at(0.0, 0.0, 0.0);
     let nodes = scene["nodes"].as_array_mut().unwrap();
     nodes.push(json!({ "camera": 0, "translation": at(0.1, 0.7, 3.0) }));
-    nodes.push(json!({ "translation": at(1.0, 2.0, 1.5), "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    nodes.push(
+        json!({ "translation": at(1.0, 2.0, 1.5), "extensions": { "KHR_lights_punctual": { "light": 0 } } }),
+    );
     let last = nodes.len();
     scene["scenes"][0]["nodes"] = json!([0, last - 2, last - 1]);
     scene["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.6, "znear": 0.01 } }]);

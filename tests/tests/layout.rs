@@ -220,6 +220,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         alpha: false,
         shadow_rays: false,
         temporal: false,
+        motion: false,
     };
     let cases = [
         ("LIGHTS", Needs { lights: true, ..nothing }),
@@ -232,6 +233,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         ("REFRACTION", Needs { refraction: true, ..nothing }),
         ("EMISSION", Needs { emission: true, ..nothing }),
         ("SHADOW_RAYS", Needs { shadow_rays: true, ..nothing }),
+        ("MOTION", Needs { motion: true, ..nothing }),
     ];
     let text = shader_text("shared/needs.glsl");
     let count = text.matches("constant_id").count();

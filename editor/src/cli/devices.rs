@@ -23,11 +23,7 @@ pub(super) fn run(args: &DevicesArgs) -> anyhow::Result<ExitCode> {
         Err(error @ GpuError::NoLoader { .. }) => (Vec::new(), Some(error.to_string())),
         Err(error) => return Err(error.into()),
     };
-    let chosen = candidates
-        .iter()
-        .filter(|c| c.is_suitable())
-        .min_by_key(|c| (c.kind, std::cmp::Reverse(c.device_local_bytes), c.index))
-        .map(|c| c.index);
+    let chosen = candidates.iter().filter(|c| c.is_suitable()).min_by_key(|c| c.rank()).map(|c| c.index);
     if args.json {
         say!("{}", to_json(&candidates, chosen, problem.as_deref()));
     } else {

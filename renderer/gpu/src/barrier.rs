@@ -59,8 +59,6 @@ pub enum Access {
     AccelTrace,
     /// Read by the host.
     HostRead,
-    /// Shown by the window system.
-    Present,
 }
 
 /// What must be waited for.
@@ -152,14 +150,6 @@ impl Tracker {
         barrier
     }
 
-    /// Says that an image's content is no longer wanted: the next use starts from an undefined layout.
-    pub fn discard(&mut self, resource: ResourceId) {
-        if let Some(state) = self.states.get_mut(&resource) {
-            self.undo.push((resource, Some(state.clone())));
-            state.layout = ImageLayout::UNDEFINED;
-        }
-    }
-
     /// Forgets a destroyed resource.
     pub fn forget(&mut self, resource: ResourceId) {
         self.states.remove(&resource);
@@ -201,7 +191,6 @@ pub(crate) fn layout_of(access: Access) -> ImageLayout {
         Access::DepthAttachment => ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
         Access::TransferRead => ImageLayout::TRANSFER_SRC_OPTIMAL,
         Access::TransferWrite => ImageLayout::TRANSFER_DST_OPTIMAL,
-        Access::Present => ImageLayout::PRESENT_SRC_KHR,
         _ => ImageLayout::GENERAL,
     }
 }
@@ -242,7 +231,6 @@ fn scope(stage: Stage, access: Access) -> (S, A) {
         ),
         Access::AccelTrace => (S::RAY_TRACING_SHADER_KHR, A::ACCELERATION_STRUCTURE_READ_KHR),
         Access::HostRead => (S::HOST, A::HOST_READ),
-        Access::Present => (S::BOTTOM_OF_PIPE, A::NONE),
     }
 }
 
@@ -319,18 +307,6 @@ mod tests {
         tracker.access(R, true, Stage::Compute, Access::Sampled);
         let barrier = tracker.access(R, true, Stage::RayTracing, Access::Sampled);
         assert_eq!(barrier.map(|b| b.source_stages), Some(S::COMPUTE_SHADER));
-    }
-
-    #[test]
-    fn a_discarded_image_starts_from_an_undefined_layout() {
-        let mut tracker = Tracker::default();
-        tracker.access(R, true, Stage::Raster, Access::ColorAttachment);
-        tracker.discard(R);
-        let barrier = tracker.access(R, true, Stage::Raster, Access::ColorAttachment);
-        assert_eq!(
-            barrier.and_then(|b| b.layouts),
-            Some((ImageLayout::UNDEFINED, ImageLayout::COLOR_ATTACHMENT_OPTIMAL))
-        );
     }
 
     #[test]

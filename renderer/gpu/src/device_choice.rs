@@ -51,6 +51,11 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// Order of preference among suitable devices: smaller is better.
+    pub fn rank(&self) -> (DeviceKind, std::cmp::Reverse<u64>, usize) {
+        (self.kind, std::cmp::Reverse(self.device_local_bytes), self.index)
+    }
+
     /// Whether it has all that is required.
     pub fn is_suitable(&self) -> bool {
         self.lacks.is_empty()
@@ -113,7 +118,7 @@ pub(crate) fn choose(instance: &Instance, requirements: &Requirements) -> Result
     candidates
         .into_iter()
         .filter(|c| wanted(c) && c.is_suitable())
-        .min_by_key(|c| (c.kind, std::cmp::Reverse(c.device_local_bytes), c.index))
+        .min_by_key(Candidate::rank)
         .ok_or(GpuError::NoDevice { refusals })
 }
 

@@ -12,17 +12,26 @@ use crate::view::Targets;
 /// The pass.
 pub(crate) struct Post {
     image: ComputePipeline,
-    show: ComputePipeline,
-    window: ComputePipeline,
+    /// Made when a target is shown for the first time.
+    show: Option<ComputePipeline>,
+    /// Made for the first view with a window.
+    window: Option<ComputePipeline>,
 }
 
 impl Post {
     pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
-        Ok(Self {
-            image: builder.compute("post", "passes/post/post.comp")?,
-            show: builder.compute("post.show", "passes/post/show.comp")?,
-            window: builder.compute("post.window", "passes/post/window.comp")?,
-        })
+        Ok(Self { image: builder.compute("post", "passes/post/post.comp")?, show: None, window: None })
+    }
+
+    /// Makes what a view asks for and was not asked for before.
+    pub(crate) fn prepare(&mut self, builder: &mut Builder<'_>, show: Show, window: bool) -> Result<()> {
+        if show != Show::Image && self.show.is_none() {
+            self.show = Some(builder.compute("post.show", "passes/post/show.comp")?);
+        }
+        if window && self.window.is_none() {
+            self.window = Some(builder.compute("post.window", "passes/post/window.comp")?);
+        }
+        Ok(())
     }
 
     /// Fills `display`, and `window` where the view has one. `parity` and `filled`: which normal and depth images, and
@@ -37,14 +46,14 @@ impl Post {
         show: Show,
     ) -> Result<()> {
         let unused = scope.tables.textures.white();
-        match shown(show, targets, parity, filled) {
+        match self.show.as_ref().zip(shown(show, targets, parity, filled)) {
             None => {
                 let uses = [Use::Buffer(accumulator, Stage::Compute, Access::StorageRead)];
                 let binds =
                     [("shaded", Bind::Image(&targets.shaded)), ("display", Bind::Image(&targets.display))];
                 scope.compute(recorder, "post", &self.image, &binds, &uses, 0)?;
             }
-            Some((kind, source)) => {
+            Some((pipeline, (kind, source))) => {
                 let (float, integer) = match source {
                     Source::Float(image) => (image.unwrap_or(unused), &targets.id),
                     Source::Integer(image) => (unused, image),
@@ -54,16 +63,16 @@ impl Post {
                     ("source_uint", Bind::Image(integer)),
                     ("display", Bind::Image(&targets.display)),
                 ];
-                scope.compute(recorder, "post.show", &self.show, &binds, &[], kind)?;
+                scope.compute(recorder, "post.show", pipeline, &binds, &[], kind)?;
             }
         }
-        if let Some(window) = &targets.window {
+        if let (Some(window), Some(pipeline)) = (&targets.window, &self.window) {
             let binds = [
                 ("display", Bind::Image(&targets.display)),
                 ("gbuffer_id", Bind::Image(&targets.id)),
                 ("window", Bind::Image(window)),
             ];
-            scope.compute(recorder, "post.window", &self.window, &binds, &[], 0)?;
+            scope.compute(recorder, "post.window", pipeline, &binds, &[], 0)?;
         }
         Ok(())
     }

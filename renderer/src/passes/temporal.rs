@@ -1,7 +1,7 @@
 //! Pass `temporal`: direct light of the last frames, reprojected by motion vectors, clamped to the neighbourhood,
 //! dropped where depth or normal disagree. Enters: this frame's signals and the past. Leaves: the new past.
 
-use caustica_gpu::{Bind, ComputePipeline, Recorder};
+use caustica_gpu::{Access, Bind, Buffer, ComputePipeline, Recorder, Stage, Use};
 
 use super::{Builder, Scope};
 use crate::error::Result;
@@ -25,6 +25,7 @@ impl Temporal {
         targets: &Targets,
         parity: usize,
         filled: usize,
+        counters: &Buffer,
     ) -> Result<()> {
         let (Some(history), Some(diffuse), Some(specular)) =
             (&targets.history, &targets.direct_diffuse, &targets.direct_specular)
@@ -46,6 +47,7 @@ impl Temporal {
             ("history_diffuse", Bind::Image(&history.diffuse[filled])),
             ("history_specular", Bind::Image(&history.specular[filled])),
         ];
-        scope.compute(recorder, "temporal", &self.pipeline, &binds, &[], 0)
+        let uses = [Use::Buffer(counters, Stage::Compute, Access::StorageReadWrite)];
+        scope.compute(recorder, "temporal", &self.pipeline, &binds, &uses, 0)
     }
 }

@@ -49,7 +49,11 @@ impl Bands {
     /// The next rows of an image of `height` rows. `whole`: all of them at once.
     pub(crate) fn next(&mut self, height: u32, whole: bool) -> Band {
         if height != self.height {
-            (self.height, self.next_row, self.rows_per_band) = (height, 0, None);
+            // The cost of a row hardly changes: the rows of a band are kept in proportion.
+            let scaled =
+                |rows: u32| (u64::from(rows) * u64::from(height) / u64::from(self.height.max(1))) as u32;
+            self.rows_per_band = self.rows_per_band.map(|rows| scaled(rows).max(1));
+            (self.height, self.next_row) = (height, 0);
         }
         let rows = match self.budget_ms {
             Some(_) if !whole => self.rows_per_band.unwrap_or_else(|| height.div_ceil(FIRST_BANDS)),

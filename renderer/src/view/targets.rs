@@ -23,6 +23,7 @@ pub(crate) struct Targets {
     pub(crate) depth: Vec<Image>,
     pub(crate) base_color: Image,
     pub(crate) material: Image,
+    /// One texel that is bound and never written when nothing reads motion vectors.
     pub(crate) motion: Image,
     pub(crate) emissive: Option<Image>,
     pub(crate) direct_diffuse: Option<Image>,
@@ -51,6 +52,14 @@ impl Targets {
             let desc = ImageDesc { extent, format: Format::Depth32, mip_levels: 1, usage: ImageUse::Depth };
             Image::new(device, name, desc)
         };
+        let one_texel = || {
+            let (extent, format) = ([1, 1], Format::Rg32Float);
+            Image::new(
+                device,
+                "unused motion",
+                ImageDesc { extent, format, mip_levels: 1, usage: ImageUse::Target },
+            )
+        };
         let pasts = if needs.temporal { 2 } else { 1 };
         let light = needs.direct_light();
         let history = if needs.temporal && light {
@@ -70,7 +79,7 @@ impl Targets {
             depth: (0..pasts).map(|_| depth("gbuffer_depth")).collect::<std::result::Result<_, _>>()?,
             base_color: make("gbuffer_base_color", Format::Rgba16Float)?,
             material: make("gbuffer_material", Format::Rg16Float)?,
-            motion: make("gbuffer_motion", Format::Rg32Float)?,
+            motion: if needs.motion { make("gbuffer_motion", Format::Rg32Float) } else { one_texel() }?,
             emissive: optional(needs.emission, "gbuffer_emissive", Format::Rgba32Float)?,
             direct_diffuse: optional(light, "direct_diffuse", Format::Rgba32Float)?,
             direct_specular: optional(light, "direct_specular", Format::Rgba32Float)?,

@@ -21,7 +21,9 @@ void store_pixel(ivec2 at, GbufferPixel pixel) {
     imageStore(gbuffer_normal, at, uvec4(pixel.normal, 0u, 0u));
     imageStore(gbuffer_base_color, at, pixel.base_color);
     imageStore(gbuffer_material, at, vec4(pixel.material, 0.0, 0.0));
-    imageStore(gbuffer_motion, at, vec4(pixel.motion, 0.0, 0.0));
+    if (NEEDS_MOTION) {
+        imageStore(gbuffer_motion, at, vec4(pixel.motion, 0.0, 0.0));
+    }
     if (NEEDS_EMISSION) {
         imageStore(gbuffer_emissive, at, vec4(pixel.emissive, 1.0));
     }
@@ -32,7 +34,9 @@ void store_background(ivec2 at) {
     imageStore(gbuffer_normal, at, uvec4(0u));
     imageStore(gbuffer_base_color, at, vec4(0.0));
     imageStore(gbuffer_material, at, vec4(0.0));
-    imageStore(gbuffer_motion, at, vec4(0.0));
+    if (NEEDS_MOTION) {
+        imageStore(gbuffer_motion, at, vec4(0.0));
+    }
     if (NEEDS_EMISSION) {
         imageStore(gbuffer_emissive, at, vec4(0.0));
     }

@@ -187,13 +187,17 @@ void main() {
         old = reproject(frame, scene, pixel, id, normal, octahedral_decode(normals.y));
     }
     Neighbourhood neighbours = gather(frame, at, id.x, normal);
+    vec3 diffuse = texelFetch(direct_diffuse, at, 0).rgb;
+    vec3 specular = texelFetch(direct_specular, at, 0).rgb;
+    bool finite = is_finite(diffuse) && is_finite(specular);
+    if (!finite) {
+        atomicAdd(CounterTable(frame.counters).counters.non_finite, 1u);
+    }
     if (neighbours.count == 0.0) {
         store(at, old.diffuse, old.specular); // not even this pixel is finite: keep what there was
         return;
     }
-    vec3 diffuse = texelFetch(direct_diffuse, at, 0).rgb;
-    vec3 specular = texelFetch(direct_specular, at, 0).rgb;
-    if (!is_finite(diffuse) || !is_finite(specular)) {
+    if (!finite) {
         diffuse = mean(neighbours.diffuse, neighbours.count);
         specular = mean(neighbours.specular, neighbours.count);
     }

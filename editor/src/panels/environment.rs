@@ -71,8 +71,15 @@ fn constant_field(ui: &mut Ui, radiance: &mut Vec3) {
         let mut factor = strength;
         let recolored = ui.color_edit_button_rgb(&mut rgb).changed();
         let speed = f64::from(factor.max(0.1)) * 0.01;
-        let scaled =
-            ui.add(DragValue::new(&mut factor).range(0.0..=1e6).speed(speed).prefix("\u{d7} ")).changed();
+        let scaled = ui
+            .add(
+                DragValue::new(&mut factor)
+                    .range(0.0..=1e6)
+                    .clamp_existing_to_range(false)
+                    .speed(speed)
+                    .prefix("\u{d7} "),
+            )
+            .changed();
         if recolored || scaled {
             *radiance = Vec3::from(rgb) * factor;
         }
@@ -98,7 +105,13 @@ fn file_fields(ui: &mut Ui, file: &mut EnvironmentFile) -> bool {
     });
     field(ui, "Strength", "Factor on the image's radiance", |ui| {
         let speed = f64::from(file.scale.max(0.1)) * 0.01;
-        ui.add(DragValue::new(&mut file.scale).range(0.0..=1e6).speed(speed).prefix("\u{d7} "));
+        ui.add(
+            DragValue::new(&mut file.scale)
+                .range(0.0..=1e6)
+                .clamp_existing_to_range(false)
+                .speed(speed)
+                .prefix("\u{d7} "),
+        );
     });
     choose
 }

@@ -164,8 +164,10 @@ fn light_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Light) {
     field(ui, "Kind", "What the light looks like from afar", |ui| kind_menu(ui, &mut light.kind));
     field(ui, "Colour", "Linear colour, multiplied by the intensity", |ui| {
         let mut rgb = light.color.to_array();
-        ui.color_edit_button_rgb(&mut rgb);
-        light.color = rgb.into();
+        // The widget rounds what it shows: only a change by the user counts.
+        if ui.color_edit_button_rgb(&mut rgb).changed() {
+            light.color = rgb.into();
+        }
     });
     let (unit, tip) = match light.kind {
         LightKind::Directional { .. } => (" lx", "Illuminance in lux, on a surface that faces the light"),
@@ -173,7 +175,13 @@ fn light_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Light) {
     };
     field(ui, "Intensity", tip, |ui| {
         let speed = f64::from(light.intensity.abs().max(0.1)) * 0.01;
-        ui.add(DragValue::new(&mut light.intensity).range(0.0..=1e9).speed(speed).suffix(unit));
+        ui.add(
+            DragValue::new(&mut light.intensity)
+                .range(0.0..=1e9)
+                .clamp_existing_to_range(false)
+                .speed(speed)
+                .suffix(unit),
+        );
     });
     match &mut light.kind {
         LightKind::Point { radius_m, range_m } => {
@@ -232,7 +240,14 @@ fn kind_menu(ui: &mut Ui, kind: &mut LightKind) {
 
 fn radius_field(ui: &mut Ui, radius_m: &mut f32) {
     field(ui, "Radius", "Of the shining sphere: larger gives softer shadows, zero hard ones", |ui| {
-        ui.add(DragValue::new(radius_m).range(0.0..=1e4).speed(0.002).max_decimals(4).suffix(" m"));
+        ui.add(
+            DragValue::new(radius_m)
+                .range(0.0..=1e4)
+                .clamp_existing_to_range(false)
+                .speed(0.002)
+                .max_decimals(4)
+                .suffix(" m"),
+        );
     });
 }
 
@@ -246,7 +261,13 @@ fn range_field(ui: &mut Ui, range_m: &mut Option<f32>) {
             _ => {}
         }
         if let Some(range) = range_m {
-            ui.add(DragValue::new(range).range(1e-3..=1e9).speed(0.05).suffix(" m"));
+            ui.add(
+                DragValue::new(range)
+                    .range(1e-3..=1e9)
+                    .clamp_existing_to_range(false)
+                    .speed(0.05)
+                    .suffix(" m"),
+            );
         }
     });
 }
@@ -254,7 +275,12 @@ fn range_field(ui: &mut Ui, range_m: &mut Option<f32>) {
 fn angle_field(ui: &mut Ui, name: &str, tip: &str, angle_rad: &mut f32, low: f32, high: f32) {
     field(ui, name, tip, |ui| {
         let mut degrees = angle_rad.to_degrees();
-        let drag = DragValue::new(&mut degrees).range(low..=high).speed(0.1).max_decimals(3).suffix("\u{b0}");
+        let drag = DragValue::new(&mut degrees)
+            .range(low..=high)
+            .clamp_existing_to_range(false)
+            .speed(0.1)
+            .max_decimals(3)
+            .suffix("\u{b0}");
         if ui.add(drag).changed() {
             *angle_rad = degrees.to_radians();
         }
@@ -276,13 +302,24 @@ fn camera_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Camera) {
         }
         Projection::Orthographic { ymag_m } => {
             field(ui, "Half height", "Of the picture, metres", |ui| {
-                ui.add(DragValue::new(ymag_m).range(1e-4..=1e6).speed(0.01).suffix(" m"));
+                ui.add(
+                    DragValue::new(ymag_m)
+                        .range(1e-4..=1e6)
+                        .clamp_existing_to_range(false)
+                        .speed(0.01)
+                        .suffix(" m"),
+                );
             });
         }
     }
     field(ui, "Near", "Nothing nearer than this is seen", |ui| {
         ui.add(
-            DragValue::new(&mut camera.near_m).range(1e-6..=1e3).speed(0.001).max_decimals(5).suffix(" m"),
+            DragValue::new(&mut camera.near_m)
+                .range(1e-6..=1e3)
+                .clamp_existing_to_range(false)
+                .speed(0.001)
+                .max_decimals(5)
+                .suffix(" m"),
         );
     });
     if camera != old {
@@ -304,7 +341,10 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     let Some(node) = document.node(target.node) else { return };
     let NodeKind::Prefab { prefab, .. } = &node.kind else { return };
     let Some(prefab) = document.prefab(*prefab) else { return };
-    let (source, missing) = (prefab.source.display().to_string(), prefab.missing);
+    // Inside the project's folder, the path from there is enough.
+    let folder = cx.session.path().and_then(std::path::Path::parent);
+    let shown = folder.and_then(|folder| prefab.source.strip_prefix(folder).ok()).unwrap_or(&prefab.source);
+    let (source, missing) = (shown.display().to_string(), prefab.missing);
     let changed = document.part_override(target).is_some();
     section(ui, "Source", |ui| {
         ui.label(RichText::new(&source).small()).on_hover_text("The file that this instance shows");

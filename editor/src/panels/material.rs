@@ -56,8 +56,10 @@ fn edit_material(cx: &mut Cx<'_>, ui: &mut Ui, id: MaterialId, old: &Material) {
         "Albedo of a rough surface, reflectance of metals and mirrors, tint of glass",
         |ui| {
             let mut rgba = new.base_color.to_array();
-            ui.color_edit_button_rgba_unmultiplied(&mut rgba);
-            new.base_color = rgba.into();
+            // The widget rounds what it shows: only a change by the user counts.
+            if ui.color_edit_button_rgba_unmultiplied(&mut rgba).changed() {
+                new.base_color = rgba.into();
+            }
             texture_note(cx, ui, new.base_color_texture);
         },
     );
@@ -76,7 +78,12 @@ fn edit_material(cx: &mut Cx<'_>, ui: &mut Ui, id: MaterialId, old: &Material) {
     alpha_field(ui, &mut new);
     if new.normal_texture.is_some() {
         field(ui, "Normal map", "Strength of the bumps", |ui| {
-            ui.add(DragValue::new(&mut new.normal_scale).range(0.0..=8.0).speed(0.01));
+            ui.add(
+                DragValue::new(&mut new.normal_scale)
+                    .range(0.0..=8.0)
+                    .clamp_existing_to_range(false)
+                    .speed(0.01),
+            );
             texture_note(cx, ui, new.normal_texture);
         });
     }
@@ -121,12 +128,20 @@ fn pbr_fields(cx: &Cx<'_>, ui: &mut Ui, material: &mut Material) {
 /// A slider from 0 to 1 that leaves room for its figure and an icon.
 fn share_slider(ui: &mut Ui, value: &mut f32) {
     ui.spacing_mut().slider_width = (ui.available_width() - 96.0).clamp(32.0, 160.0);
-    ui.add(Slider::new(value, 0.0..=1.0).fixed_decimals(2));
+    let mut shown = *value;
+    if ui
+        .add(Slider::new(&mut shown, 0.0..=1.0).clamping(egui::SliderClamping::Edits).fixed_decimals(2))
+        .changed()
+    {
+        *value = shown;
+    }
 }
 
 fn ior_field(ui: &mut Ui, ior: &mut f32) {
     field(ui, "IOR", "Index of refraction: how strongly light bends", |ui| {
-        ui.add(DragValue::new(ior).range(1.0..=4.0).speed(0.005).max_decimals(3));
+        ui.add(
+            DragValue::new(ior).range(1.0..=4.0).clamp_existing_to_range(false).speed(0.005).max_decimals(3),
+        );
         let name = IOR_PRESETS
             .iter()
             .find(|(_, value)| (value - *ior).abs() < 5e-4)
@@ -155,9 +170,17 @@ fn volume_fields(ui: &mut Ui, material: &mut Material) {
         }
         if let Some(distance) = &mut material.attenuation_distance_m {
             let mut rgb = material.attenuation_color.to_array();
-            ui.color_edit_button_rgb(&mut rgb);
-            material.attenuation_color = rgb.into();
-            ui.add(DragValue::new(distance).range(1e-5..=1e5).speed(0.002).max_decimals(4).suffix(" m"));
+            if ui.color_edit_button_rgb(&mut rgb).changed() {
+                material.attenuation_color = rgb.into();
+            }
+            ui.add(
+                DragValue::new(distance)
+                    .range(1e-5..=1e5)
+                    .clamp_existing_to_range(false)
+                    .speed(0.002)
+                    .max_decimals(4)
+                    .suffix(" m"),
+            );
         }
     });
 }
@@ -165,11 +188,16 @@ fn volume_fields(ui: &mut Ui, material: &mut Material) {
 fn emission_fields(cx: &Cx<'_>, ui: &mut Ui, material: &mut Material) {
     field(ui, "Emission", "Colour, and strength in candela per square metre (nits)", |ui| {
         let mut rgb = material.emissive.to_array();
-        ui.color_edit_button_rgb(&mut rgb);
-        material.emissive = rgb.into();
+        if ui.color_edit_button_rgb(&mut rgb).changed() {
+            material.emissive = rgb.into();
+        }
         let speed = f64::from(material.emissive_strength.abs().max(0.1)) * 0.01;
         ui.add(
-            DragValue::new(&mut material.emissive_strength).range(0.0..=1e9).speed(speed).prefix("\u{d7} "),
+            DragValue::new(&mut material.emissive_strength)
+                .range(0.0..=1e9)
+                .clamp_existing_to_range(false)
+                .speed(speed)
+                .prefix("\u{d7} "),
         );
         texture_note(cx, ui, material.emissive_texture);
     });
@@ -188,7 +216,7 @@ fn alpha_field(ui: &mut Ui, material: &mut Material) {
             ui.selectable_value(&mut material.alpha, AlphaMode::Blend, "Blend");
         });
         if let AlphaMode::Mask { cutoff } = &mut material.alpha {
-            ui.add(DragValue::new(cutoff).range(0.0..=1.0).speed(0.005))
+            ui.add(DragValue::new(cutoff).range(0.0..=1.0).clamp_existing_to_range(false).speed(0.005))
                 .on_hover_text("Below this, nothing is there");
         }
     });

@@ -63,7 +63,12 @@ fn picture(ui: &mut Ui, settings: &mut ViewSettings) {
     field(ui, "Show", "The finished picture or a step on the way", |ui| show_menu(ui, &mut settings.show));
     field(ui, "Exposure", "Stops: each doubles the light. The picture is not rendered anew", |ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - 96.0).clamp(32.0, 160.0);
-        ui.add(Slider::new(&mut settings.exposure_ev, -10.0..=10.0).max_decimals(2).suffix(" EV"));
+        ui.add(
+            Slider::new(&mut settings.exposure_ev, -10.0..=10.0)
+                .clamping(egui::SliderClamping::Edits)
+                .max_decimals(2)
+                .suffix(" EV"),
+        );
     });
     field(ui, "Tone map", "How radiance becomes a colour that a screen can show", |ui| {
         egui::ComboBox::from_id_salt("tone map").selected_text(tone_name(settings.tone_map)).show_ui(

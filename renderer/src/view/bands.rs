@@ -10,8 +10,8 @@ use caustica_gpu::FrameResult;
 const FIRST_BANDS: u32 = 16;
 /// Most bands of a sample.
 const MOST_BANDS: u32 = 128;
-/// Passes with this ending are cut; the others run once a sample.
-const CUT_PASSES: &str = ".trace";
+/// Passes that are cut; the others run once a sample.
+const CUT_PASSES: [&str; 2] = ["shadow.trace", "shading.trace"];
 
 /// Rows of one submit.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,7 +98,7 @@ impl Bands {
     fn plan(&mut self, times: &[(String, f64)]) {
         let Some(budget_ms) = self.budget_ms else { return };
         let cut_ms: f64 =
-            times.iter().filter(|(label, _)| label.ends_with(CUT_PASSES)).map(|(_, ms)| ms).sum();
+            times.iter().filter(|(label, _)| CUT_PASSES.contains(&label.as_str())).map(|(_, ms)| ms).sum();
         let bands = (cut_ms / budget_ms.max(1.0)).ceil().clamp(1.0, f64::from(MOST_BANDS));
         self.rows_per_band = Some((f64::from(self.height) / bands).ceil() as u32);
     }

@@ -76,7 +76,7 @@ pub(super) fn open(path: &Path, loaded: Loaded) -> anyhow::Result<Opened> {
             let settings = settings.and_then(|read| {
                 read.inspect_err(|error| tracing::warn!("{}: render settings: {error}", path.display())).ok()
             });
-            Ok(Opened { document, meta, path: Some(path.to_owned()), camera, settings })
+            Ok(Opened { document, meta, path: Some(absolute(path)), camera, settings })
         }
         other => {
             let mut document = Document::new();
@@ -85,6 +85,11 @@ pub(super) fn open(path: &Path, loaded: Loaded) -> anyhow::Result<Opened> {
             Ok(Opened { document, meta: ProjectMeta::default(), path: None, camera: None, settings: None })
         }
     }
+}
+
+/// The path whatever the working folder becomes; as it was where the system gives no working folder.
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// An edit that brings something in, and the node that it makes.

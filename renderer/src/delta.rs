@@ -272,6 +272,8 @@ pub struct Material {
     pub transmission: f32,
     /// True when light crosses a volume (KHR_materials_volume, thickness above 0); false: a thin sheet that does not bend light.
     pub has_volume: bool,
+    /// Where volumes overlap, the one with the higher number is there; equal: the one entered last.
+    pub volume_priority: u8,
     /// Colour that white light has after `attenuation_distance_m`.
     pub attenuation_color: Vec3,
     /// Distance of the above in metres; infinity: no attenuation.
@@ -302,6 +304,7 @@ impl Default for Material {
             specular_color: Vec3::ONE,
             transmission: 0.0,
             has_volume: false,
+            volume_priority: 0,
             attenuation_color: Vec3::ONE,
             attenuation_distance_m: f32::INFINITY,
             alpha: AlphaMode::Opaque,

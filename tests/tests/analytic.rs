@@ -357,6 +357,38 @@ fn nothing_is_lost_or_gained_in_a_furnace() {
     }
 }
 
+/// Looks straight through an absorbing block with a clear one inside; gives the mean radiance in a furnace.
+fn through_nested_glass(outer_priority: u8, inner_priority: u8) -> f64 {
+    let sigma = std::f32::consts::LN_2;
+    let outer = Material {
+        attenuation_color: Vec3::splat((-sigma).exp()),
+        attenuation_distance_m: 1.0,
+        volume_priority: outer_priority,
+        ..glass(1.5)
+    };
+    let inner = Material { volume_priority: inner_priority, ..glass(1.5) };
+    let mut scene = Scene::new();
+    scene.put(cube(1.0), outer, Affine3A::from_scale(Vec3::new(2.0, 2.0, 1.0)));
+    scene.put(cube(1.0), inner, Affine3A::from_scale(Vec3::new(1.0, 1.0, 0.5)));
+    scene.surround(1.0);
+    let settings = ViewSettings { max_depth: 64, ..still(Pipeline::Hybrid) };
+    let mut studio = Studio::of([16, 16], settings, &scene.delta, camera_parallel(3.0, 0.2));
+    let image = studio.mean(64);
+    pixels([16, 16]).map(|(x, y)| red(&image, x, y)).sum::<f64>() / 256.0
+}
+
+#[test]
+fn where_glasses_overlap_the_higher_priority_counts() {
+    // Straight on, a slab that lets the share `a` through in one pass reflects R at each face: all orders added up,
+    // R + (1 - R)^2 a / (1 - R a) of a furnace's light comes back. The inner block has the same index: no faces of its own.
+    let seen = |a: f64| 0.04 + 0.96 * 0.96 * a / (1.0 - 0.04 * a);
+    let (one_metre, half_a_metre) = (seen(0.5), seen(0.5_f64.sqrt()));
+    for (outer, inner, expected) in [(1, 0, one_metre), (0, 1, half_a_metre), (0, 0, half_a_metre)] {
+        let found = through_nested_glass(outer, inner);
+        assert!((found - expected).abs() < 0.01, "priorities {outer}, {inner}: {found}, expected {expected}");
+    }
+}
+
 /// A ball and a mirroring cube on a floor under one hard lamp, all of it `scale` times as large: one sample is exact.
 fn scaled(scale: f32) -> (Scene, caustica_renderer::delta::Camera) {
     let mut scene = Scene::new();

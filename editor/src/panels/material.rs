@@ -99,6 +99,8 @@ fn mode_buttons(ui: &mut Ui, material: &mut Material) {
         for (mode, name, tip) in MODES {
             if ui.selectable_label(material.mode == mode, name).on_hover_text(tip).clicked() {
                 material.mode = mode;
+                // Glass is solid unless the user says that it is a sheet.
+                material.has_volume |= mode == ShadingMode::Refractive;
             }
         }
     });
@@ -157,6 +159,19 @@ fn ior_field(ui: &mut Ui, ior: &mut f32) {
 }
 
 fn volume_fields(ui: &mut Ui, material: &mut Material) {
+    field(
+        ui,
+        "Solid",
+        "On: the mesh encloses glass, light bends. Off: a thin sheet, light goes straight through",
+        |ui| {
+            ui.checkbox(&mut material.has_volume, "");
+        },
+    );
+    if material.has_volume {
+        field(ui, "Priority", "Where solids overlap, the one with the higher number is there", |ui| {
+            ui.add(DragValue::new(&mut material.volume_priority).speed(0.1));
+        });
+    }
     field(ui, "Absorption", "White light has this colour after the distance beside it; off: clear", |ui| {
         let mut absorbs = material.attenuation_distance_m.is_some();
         ui.checkbox(&mut absorbs, "");

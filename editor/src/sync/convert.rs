@@ -120,6 +120,7 @@ pub fn material_of(material: &scene::Material) -> delta::Material {
         specular_color: material.specular_color,
         transmission: material.transmission,
         has_volume: material.has_volume,
+        volume_priority: material.volume_priority,
         attenuation_color: material.attenuation_color,
         attenuation_distance_m: material.attenuation_distance_m.unwrap_or(f32::INFINITY),
         alpha: match material.alpha {

@@ -140,7 +140,7 @@ fn pack(material: &delta::Material, textures: &Textures) -> gpu_types::Material 
             ShadingMode::Unlit => MODE_UNLIT,
         },
         flags,
-        medium_priority: 0,
+        medium_priority: u32::from(material.volume_priority),
         base_color_texture: texture(&material.base_color_texture),
         metallic_roughness_texture: texture(&material.metallic_roughness_texture),
         normal_texture: texture(&material.normal_texture),

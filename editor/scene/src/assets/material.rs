@@ -79,6 +79,9 @@ pub struct Material {
     pub transmission: f32,
     /// True when light crosses a volume (KHR_materials_volume, thickness above 0); false: a thin sheet.
     pub has_volume: bool,
+    /// Where volumes overlap, the one with the higher number is there (Schmidt and Budge 2002); equal: the one entered
+    /// last. glTF has no place for it: `extras.volumePriority` of the material.
+    pub volume_priority: u8,
     /// Colour that white light has after `attenuation_distance_m`.
     pub attenuation_color: Vec3,
     /// Distance of the above in metres; `None`: no attenuation.
@@ -111,6 +114,7 @@ impl Default for Material {
             specular_color: Vec3::ONE,
             transmission: 0.0,
             has_volume: false,
+            volume_priority: 0,
             attenuation_color: Vec3::ONE,
             attenuation_distance_m: None,
             alpha: AlphaMode::Opaque,

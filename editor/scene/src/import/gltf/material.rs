@@ -87,6 +87,11 @@ fn read_extensions(item: &Item<'_>, material: &mut Material) -> Result<(), Fault
             _ => None,
         };
     }
+    if let Some(extras) = item.get("extras")
+        && extras.get("volumePriority").is_some()
+    {
+        material.volume_priority = extras.f32_or("volumePriority", 0.0)?.clamp(0.0, 255.0) as u8;
+    }
     let smooth = material.roughness <= SMOOTH_ROUGHNESS && material.metallic_roughness_texture.is_none();
     if item.extension("KHR_materials_unlit")?.is_some() {
         material.mode = ShadingMode::Unlit;

@@ -92,14 +92,20 @@ pub fn run() -> ExitCode {
         Some(Command::Render(args)) => logged(|| render::run(&args, &cli.device, cli.shaders.clone())),
         Some(Command::Check(args)) => logged(|| check::run(&args)),
         Some(Command::Devices(args)) => logged(|| devices::run(&args)),
-        None => crate::app::run(crate::app::AppOptions {
-            file: cli.file.or_else(demo_project),
-            device: cli.device.device.clone(),
-            shaders: cli.shaders,
-            validation: cli.device.validation,
-            memory_limit_bytes: cli.device.memory_limit_bytes(),
-        })
-        .map(|()| ExitCode::SUCCESS),
+        None => match cli.file.as_ref().filter(|file| !file.exists()) {
+            Some(missing) => {
+                let missing = missing.display();
+                Err(anyhow::anyhow!("{missing}: there is no such file, and no such command (see --help)"))
+            }
+            None => crate::app::run(crate::app::AppOptions {
+                file: cli.file.or_else(demo_project),
+                device: cli.device.device.clone(),
+                shaders: cli.shaders,
+                validation: cli.device.validation,
+                memory_limit_bytes: cli.device.memory_limit_bytes(),
+            })
+            .map(|()| ExitCode::SUCCESS),
+        },
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");

@@ -191,7 +191,8 @@ impl Session {
         if let Some(settings) = opened.settings {
             self.set_settings(settings);
         }
-        self.camera = opened.camera.unwrap_or_else(|| ViewCamera::of_document(&self.document, None));
+        self.camera =
+            opened.camera.unwrap_or_else(|| ViewCamera::of_document(&self.document, None, self.aspect()));
         Ok(())
     }
 
@@ -233,7 +234,7 @@ impl Session {
         let (edit, node) = (node.edit, node.node);
         self.push(edit)?;
         if was_empty {
-            self.camera = ViewCamera::of_document(&self.document, None);
+            self.camera = ViewCamera::of_document(&self.document, None, self.aspect());
         }
         Ok(node)
     }
@@ -249,6 +250,12 @@ impl Session {
         self.path = Some(path.to_owned());
         self.history.mark_saved();
         Ok(())
+    }
+
+    /// Width / height of the view.
+    fn aspect(&self) -> f64 {
+        let [width, height] = self.renderer.view(self.view).map_or([1, 1], |view| view.extent());
+        f64::from(width) / f64::from(height.max(1))
     }
 
     /// Camera of the view.

@@ -105,7 +105,8 @@ impl EditorWindow {
         let attributes = Window::default_attributes()
             .with_title("Caustica")
             .with_inner_size(LogicalSize::new(width, height))
-            .with_min_inner_size(LogicalSize::new(640.0, 400.0));
+            // Below this the panels are squeezed to their smallest widths, which the layout would then keep.
+            .with_min_inner_size(LogicalSize::new(1000.0, 640.0));
         let window = Arc::new(event_loop.create_window(attributes).context("opening the window")?);
         let display = window.display_handle().context("asking for the display")?.as_raw();
         let handle = window.window_handle().context("asking for the window")?.as_raw();

@@ -55,10 +55,10 @@ pub(super) struct RenderArgs {
     #[arg(long)]
     seed: Option<u32>,
     /// Reflections and refractions after the first surface
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
     max_depth: Option<u32>,
     /// Shadow rays a light and pixel
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     shadow_rays: Option<u32>,
     /// First sample of a set that is rendered in parts
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 47))]
@@ -165,9 +165,10 @@ pub(super) fn run(
         let known: Vec<String> =
             session.document().cameras().map(|c| session.document().display_name(c.target)).collect();
         if session.document().find_camera(name).is_none() {
-            bail!("{}: no camera '{name}'; there are: {}", args.file.display(), known.join(", "));
+            let known = if known.is_empty() { String::from("the file has none") } else { known.join(", ") };
+            bail!("{}: no camera '{name}'; there is: {known}", args.file.display());
         }
-        session.set_camera(ViewCamera::of_document(session.document(), Some(name)));
+        session.set_camera(ViewCamera::of_document(session.document(), Some(name), 1.0));
     }
     session.set_settings(settings_of(args, session.settings().clone()));
     if args.sample_offset > 0 {

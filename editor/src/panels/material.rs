@@ -148,9 +148,9 @@ fn ior_field(ui: &mut Ui, ior: &mut f32) {
             .iter()
             .find(|(_, value)| (value - *ior).abs() < 5e-4)
             .map_or("\u{2014}", |(name, _)| name);
-        egui::ComboBox::from_id_salt("ior").selected_text(name).show_ui(ui, |ui| {
+        egui::ComboBox::from_id_salt("ior").height(400.0).selected_text(name).show_ui(ui, |ui| {
             for (name, value) in IOR_PRESETS {
-                if ui.selectable_label((value - *ior).abs() < 5e-4, format!("{name}  {value}")).clicked() {
+                if ui.selectable_label((value - *ior).abs() < 5e-4, format!("{name}  {value:.3}")).clicked() {
                     *ior = value;
                 }
             }

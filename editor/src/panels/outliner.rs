@@ -170,8 +170,13 @@ fn rename_ui(cx: &mut Cx<'_>, ui: &mut Ui, rect: Rect, row: Row) {
         Pos2::new(rect.right() - 4.0, rect.bottom() - 1.0),
     );
     let Some((_, text)) = &mut cx.state.outliner.renaming else { return };
+    let length = text.chars().count();
     let edit = TextEdit::singleline(text).id(ui.id().with("rename")).margin(vec2(4.0, 2.0));
     let response = ui.put(field, edit);
+    if !response.has_focus() && !response.lost_focus() {
+        // The first frame: what is typed replaces the old name.
+        select_all(ui, response.id, length);
+    }
     if response.lost_focus() {
         let escaped = ui.input(|input| input.key_pressed(Key::Escape));
         if let Some((target, name)) = cx.state.outliner.renaming.take()
@@ -183,6 +188,14 @@ fn rename_ui(cx: &mut Cx<'_>, ui: &mut Ui, rect: Rect, row: Row) {
     } else {
         response.request_focus();
     }
+}
+
+/// Selects the whole text of a field.
+fn select_all(ui: &Ui, field: egui::Id, length: usize) {
+    use egui::text::{CCursor, CCursorRange};
+    let mut state = egui::text_edit::TextEditState::load(ui.ctx(), field).unwrap_or_default();
+    state.cursor.set_char_range(Some(CCursorRange::two(CCursor::new(0), CCursor::new(length))));
+    state.store(ui.ctx(), field);
 }
 
 /// Starts to type a new name in the row of a target.

@@ -43,22 +43,24 @@ impl ViewCamera {
         }
     }
 
-    /// The named camera, else the document's main one, else one that frames everything.
-    pub fn of_document(document: &Document, name: Option<&str>) -> Self {
+    /// The named camera, else the document's main one, else one that frames everything in an image of width / height
+    /// `aspect`.
+    pub fn of_document(document: &Document, name: Option<&str>, aspect: f64) -> Self {
         let camera = name.and_then(|name| document.find_camera(name)).or_else(|| document.main_camera());
         match (camera, document.bounds()) {
             (Some(camera), _) => Self::of_placed(&camera),
-            (None, Some((low, high))) => Self::framing(low, high),
+            (None, Some((low, high))) => Self::framing(low, high, aspect),
             (None, None) => Self::default(),
         }
     }
 
-    /// A camera that sees the box from above its front right.
-    pub fn framing(low: DVec3, high: DVec3) -> Self {
+    /// A camera that sees the box from above its front right, in an image of width / height `aspect`.
+    pub fn framing(low: DVec3, high: DVec3, aspect: f64) -> Self {
         const YFOV_RAD: f32 = 0.7;
         let centre = (low + high) * 0.5;
         let radius = ((high - low).length() * 0.5).max(1e-9);
-        let distance = radius / (f64::from(YFOV_RAD) * 0.5).sin();
+        let half_angle = ((f64::from(YFOV_RAD) * 0.5).tan() * aspect.clamp(0.01, 1.0)).atan();
+        let distance = radius / half_angle.sin();
         let eye = centre + DVec3::new(0.55, 0.35, 1.0).normalize() * distance;
         Self::looking_at(eye, centre, YFOV_RAD, (distance - radius).max(radius * 0.01) * 0.1)
     }
@@ -70,7 +72,7 @@ mod tests {
 
     #[test]
     fn framing_looks_at_the_centre_from_outside() {
-        let camera = ViewCamera::framing(DVec3::splat(-1.0), DVec3::new(3.0, 1.0, 1.0));
+        let camera = ViewCamera::framing(DVec3::splat(-1.0), DVec3::new(3.0, 1.0, 1.0), 1.0);
         let forward = -camera.world_from_camera.z_axis;
         let to_centre = (DVec3::new(1.0, 0.0, 0.0) - camera.world_from_camera.translation).normalize();
         assert!(forward.dot(to_centre) > 1.0 - 1e-9);

@@ -148,7 +148,9 @@ pub fn environment_argument(text: &str) -> anyhow::Result<Environment> {
         return Ok(Environment::Constant(glam::Vec3::new(r, g, b)));
     }
     let path = Path::new(text);
-    let (map, _) = import::load_environment(path).with_context(|| format!("--environment {text}"))?;
+    let (map, _) = import::load_environment(path).with_context(|| {
+        format!("--environment {text}: neither three numbers R,G,B nor a file that can be read")
+    })?;
     let map = Some(Arc::new(map));
     Ok(Environment::File(EnvironmentFile { path: path.to_owned(), rotation_rad: 0.0, scale: 1.0, map }))
 }

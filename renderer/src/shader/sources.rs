@@ -42,9 +42,7 @@ impl ShaderSources {
             return Err(refuse(String::from("a shader path must stay inside the shader folder")));
         }
         match &self.folder {
-            Some(folder) => {
-                std::fs::read_to_string(folder.join(file)).map_err(|error| refuse(error.to_string()))
-            }
+            Some(folder) => read_file(&folder.join(file)).map_err(refuse),
             None => EMBEDDED
                 .get_file(file)
                 .and_then(include_dir::File::contents_utf8)
@@ -76,6 +74,11 @@ impl ShaderSources {
         }
         Ok(Source { file: file.to_owned(), texts })
     }
+}
+
+/// Reads a file; the reason of a failure names its full path.
+fn read_file(path: &std::path::Path) -> std::result::Result<String, String> {
+    std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
 }
 
 /// Paths named by `#include "..."` lines.

@@ -64,6 +64,7 @@ pub struct Session {
     selection_changed: bool,
     /// The renderer may hold half of a change: it gets the whole scene again.
     resync: bool,
+    picture_revision: u64,
     device: Arc<Device>,
 }
 
@@ -93,6 +94,7 @@ impl Session {
             selection: BTreeSet::new(),
             selection_changed: false,
             resync: false,
+            picture_revision: 0,
             device: Arc::clone(device),
         })
     }
@@ -128,9 +130,19 @@ impl Session {
     /// When the edit does not fit the document, which stays as it was.
     pub fn push(&mut self, edit: Edit) -> Result<(), EditError> {
         let label = edit.describe(&self.document);
+        self.note_picture(&edit);
         let inverse = self.document.apply(edit.clone())?;
         self.history.record(label, edit, inverse);
         Ok(())
+    }
+
+    fn note_picture(&mut self, edit: &Edit) {
+        self.picture_revision += u64::from(edit.changes_picture());
+    }
+
+    /// Grows with every edit, undo and redo that may change the picture.
+    pub fn picture_revision(&self) -> u64 {
+        self.picture_revision
     }
 
     /// Lets the document make an edit (which may take new ids) and applies it.
@@ -150,16 +162,18 @@ impl Session {
 
     /// Takes the open gesture back, as Esc does in a drag.
     pub fn cancel_gesture(&mut self) {
-        if let Some(step) = self.history.cancel_gesture()
-            && let Err(error) = self.document.apply(step.edit)
-        {
-            tracing::error!("taking a gesture back failed: {error}");
+        if let Some(step) = self.history.cancel_gesture() {
+            self.note_picture(&step.edit);
+            if let Err(error) = self.document.apply(step.edit) {
+                tracing::error!("taking a gesture back failed: {error}");
+            }
         }
     }
 
     /// Undoes the newest step; says what was undone.
     pub fn undo(&mut self) -> Option<String> {
         let step = self.history.take_undo()?;
+        self.note_picture(&step.edit);
         match self.document.apply(step.edit.clone()) {
             Ok(redo) => self.history.put_redo(&step, redo),
             Err(error) => tracing::error!("undo of '{}' failed: {error}", step.label),
@@ -170,6 +184,7 @@ impl Session {
     /// Does the step undone last again; says what was done.
     pub fn redo(&mut self) -> Option<String> {
         let step = self.history.take_redo()?;
+        self.note_picture(&step.edit);
         match self.document.apply(step.edit.clone()) {
             Ok(undo) => self.history.put_undo(&step, undo),
             Err(error) => tracing::error!("redo of '{}' failed: {error}", step.label),
@@ -217,6 +232,7 @@ impl Session {
         let applied = self.renderer.apply(&mut recorder, &emptied);
         self.frames.submit(recorder, None)?;
         applied?;
+        self.picture_revision += 1;
         self.history.clear();
         self.selection.clear();
         self.selection_changed = true;

@@ -214,6 +214,15 @@ impl Edit {
         Self::Batch { label: label.into(), edits }
     }
 
+    /// Whether the picture may be another afterwards.
+    pub fn changes_picture(&self) -> bool {
+        match self {
+            Self::Rename { .. } | Self::SetDefaultCamera(_) => false,
+            Self::Batch { edits, .. } => edits.iter().any(Self::changes_picture),
+            _ => true,
+        }
+    }
+
     /// What it does in words for the status bar and the undo list, such as "moved Chair".
     /// Call it before the edit is applied when the edit removes something.
     pub fn describe(&self, document: &Document) -> String {
@@ -292,4 +301,19 @@ impl Edit {
 /// A name, or what kind of thing it is with its id when it has none.
 pub(crate) fn shown(name: &str, kind: &str, id: u64) -> String {
     if name.is_empty() { format!("{kind} {id}").trim_start().to_owned() } else { name.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::NodeId;
+
+    #[test]
+    fn names_do_not_change_the_picture() {
+        let rename = || Edit::Rename { target: Target::node(NodeId(1)), name: String::from("Chair") };
+        let hide = Edit::SetVisible { target: Target::node(NodeId(1)), visible: false };
+        assert!(!rename().changes_picture() && hide.changes_picture());
+        assert!(!Edit::batch("names", vec![rename(), rename()]).changes_picture());
+        assert!(Edit::batch("both", vec![rename(), hide]).changes_picture());
+    }
 }

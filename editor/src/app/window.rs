@@ -343,7 +343,7 @@ impl EditorWindow {
     fn key(&self, extent: [u32; 2]) -> PictureKey {
         let session = &self.editor.session;
         let (camera, settings) = (*session.camera(), session.settings().clone());
-        PictureKey { camera, settings, state: session.history().state(), extent }
+        PictureKey { camera, settings, state: session.picture_revision(), extent }
     }
 
     fn note_times(&mut self) {

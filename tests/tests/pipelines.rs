@@ -150,6 +150,63 @@ fn what_cannot_be_seen_changes_nothing_else() {
     }
 }
 
+/// The same odd numbers every time: xorshift over a small set of values.
+fn odd_transforms(count: usize) -> Vec<Affine3A> {
+    const VALUES: [f32; 14] = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        0.5,
+        3.0,
+        1e-20,
+        -1e-20,
+        1e-38,
+        1e20,
+        f32::MAX,
+        f32::MIN,
+        f32::NAN,
+        f32::INFINITY,
+    ];
+    let mut state = 0x9e37_79b9_u32;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        // Odd values are rare, so that many matrices are almost ordinary.
+        let kinds = if state.is_multiple_of(3) { VALUES.len() } else { 6 };
+        VALUES[(state >> 8) as usize % kinds]
+    };
+    let mut column = || Vec3::new(next(), next(), next());
+    (0..count)
+        .map(|_| Affine3A::from_cols(column().into(), column().into(), column().into(), column().into()))
+        .collect()
+}
+
+#[test]
+fn no_transform_harms_the_device_or_the_picture() {
+    let (mut scene, camera) = zoo();
+    let id = scene.put(sphere(0.6, 12), lambert(0.5), in_front());
+    let instance =
+        scene.delta.instances.iter().find(|(other, _)| *other == id).expect("the instance").1.clone();
+    let mut studio = Studio::of([48, 32], settings(Pipeline::Hybrid), &scene.delta, camera);
+    let mut before = studio.mean(1);
+    for (index, render_from_mesh) in odd_transforms(60).into_iter().enumerate() {
+        // By turns as a whole instance and as a move alone.
+        let delta = if index % 2 == 0 {
+            let changed = Instance { render_from_mesh, ..instance.clone() };
+            SceneDelta { instances: vec![(id, changed)], ..SceneDelta::default() }
+        } else {
+            SceneDelta { transforms: vec![(id, render_from_mesh)], ..SceneDelta::default() }
+        };
+        studio.apply(&delta);
+        before = studio.mean(1);
+        assert!(before.mean.iter().flatten().all(|x| x.is_finite()), "{render_from_mesh:?}");
+    }
+    studio.apply(&SceneDelta { transforms: vec![(id, in_front())], ..SceneDelta::default() });
+    assert!(differing(&before, &studio.mean(1), 1e-2) > 20, "and back in sight");
+}
+
 #[test]
 fn back_sides_are_unseen_even_beside_glass() {
     // One mesh of three parts: a single-sided square turned away, one turned to the camera, and a pane of glass.

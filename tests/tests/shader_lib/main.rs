@@ -1,4 +1,4 @@
-//! The shader library against oracles in double precision: robustness, rows 1 and 5 to 13, each with the naive form
+//! The shader library against oracles in double precision: robustness, rows 1 and 3 to 13, each with the naive form
 //! beside it, which fails. Each snippet runs on the device through the renderer's own compiler.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
@@ -12,3 +12,4 @@ mod lights;
 mod offsets;
 mod random;
 mod scatter;
+mod shapes;

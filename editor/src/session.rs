@@ -335,12 +335,12 @@ impl Session {
 
     fn record(&mut self, recorder: &mut Recorder, extent_px: [u32; 2]) -> anyhow::Result<()> {
         if std::mem::take(&mut self.resync) {
-            self.renderer.apply(recorder, &std::mem::take(&mut self.sync).clear())?;
+            // Marked first: should this fail too, the next frame still sends everything.
             self.document.mark_all_added("tried again");
+            self.renderer.apply(recorder, &std::mem::take(&mut self.sync).clear())?;
         }
-        let structure_may_have_changed = self.selection_changed;
         let delta = self.sync.delta(&mut self.document, self.camera.world_from_camera.translation);
-        let selection_stale = structure_may_have_changed || !delta.instances.is_empty();
+        let selection_stale = self.selection_changed || !delta.instances.is_empty();
         if let Err(error) = self.renderer.apply(recorder, &delta) {
             // Half of the change is in: the next frame sends the whole scene again.
             self.resync = true;

@@ -134,7 +134,11 @@ impl Sync {
                                 .iter()
                                 .map(|id| delta::MaterialId(id.0))
                                 .collect(),
-                            visible: renderable.visible,
+                            visibility: delta::Visibility {
+                                shown: renderable.visible,
+                                ..delta::Visibility::default()
+                            },
+                            pose: None,
                         },
                     ));
                     if let Some(old) = self.instances.insert(*target, used) {

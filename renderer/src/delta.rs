@@ -51,6 +51,12 @@ pub struct SceneDelta {
     pub instances: Vec<(InstanceId, Instance)>,
     /// Instances of which the transform alone changed.
     pub transforms: Vec<(InstanceId, Affine3A)>,
+    /// Instances of which only who sees them changed.
+    pub visibility: Vec<(InstanceId, Visibility)>,
+    /// Primitives that moved inside their mesh: mesh, geometry, `mesh_from_primitive`.
+    pub primitive_transforms: Vec<(MeshId, u32, Affine3A)>,
+    /// New poses of instances whose mesh deforms.
+    pub poses: Vec<(InstanceId, Pose)>,
     /// Deleted instances.
     pub removed_instances: Vec<InstanceId>,
     /// New or changed lights.
@@ -76,6 +82,9 @@ impl SceneDelta {
             && self.removed_materials.is_empty()
             && self.instances.is_empty()
             && self.transforms.is_empty()
+            && self.visibility.is_empty()
+            && self.primitive_transforms.is_empty()
+            && self.poses.is_empty()
             && self.removed_instances.is_empty()
             && self.lights.is_empty()
             && self.removed_lights.is_empty()
@@ -106,6 +115,41 @@ pub struct Mesh {
     pub indices: Vec<u32>,
     /// The primitives of the mesh; each becomes one geometry of the BLAS.
     pub geometries: Vec<Geometry>,
+    /// How its vertices follow a pose; `None`: rigid. Each instance of a mesh that deforms has vertices and a BLAS of its own.
+    pub deformation: Option<Deformation>,
+}
+
+/// How vertices follow a [`Pose`]: first the morph targets are added, then the joints move the sum (glTF 2.0, 3.7.2.2 and 3.7.3.3).
+#[derive(Clone, Debug, Default)]
+pub struct Deformation {
+    /// Four joints a vertex, or empty: no skin. Every joint is below `joint_count`.
+    pub joints: Vec<[u16; 4]>,
+    /// Their weights, in sum 1; all zero: the vertex follows no joint. As many as `joints`.
+    pub weights: Vec<[f32; 4]>,
+    /// Number of joint matrices in a pose.
+    pub joint_count: u32,
+    /// Morph targets.
+    pub targets: Vec<MorphTarget>,
+}
+
+/// Offsets a vertex, each list with one entry a vertex or empty.
+#[derive(Clone, Debug, Default)]
+pub struct MorphTarget {
+    /// Offsets of the positions.
+    pub positions: Vec<Vec3>,
+    /// Offsets of the normals.
+    pub normals: Vec<Vec3>,
+    /// Offsets of the tangents; the handedness stays.
+    pub tangents: Vec<Vec3>,
+}
+
+/// Where the joints of one instance stand, and how far it is morphed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// One a joint: mesh space at rest to mesh space as posed (inverse bind matrix included).
+    pub joints: Vec<Affine3A>,
+    /// One a morph target.
+    pub weights: Vec<f32>,
 }
 
 /// One primitive of a mesh: a range of its indices.
@@ -128,8 +172,27 @@ pub struct Instance {
     pub render_from_mesh: Affine3A,
     /// One material for each geometry of the mesh.
     pub materials: Vec<MaterialId>,
-    /// False: instance mask 0.
-    pub visible: bool,
+    /// Who sees it.
+    pub visibility: Visibility,
+    /// The pose of a mesh that deforms; ignored otherwise. `None`: at rest.
+    pub pose: Option<Pose>,
+}
+
+/// Which rays meet an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Visibility {
+    /// False: hidden from everything (instance mask 0).
+    pub shown: bool,
+    /// Seen by the camera itself; mirrors and glass show it all the same.
+    pub to_camera: bool,
+    /// Stands in the way of light.
+    pub to_shadows: bool,
+}
+
+impl Default for Visibility {
+    fn default() -> Self {
+        Self { shown: true, to_camera: true, to_shadows: true }
+    }
 }
 
 /// How a texture is addressed outside 0..1.

@@ -71,19 +71,27 @@ twins! {
     }
 
     /// One geometry of a mesh: a run of triangles with one material.
-    struct Geometry, size 80 {
+    struct Geometry, size 144 {
         /// Device address of `vec3[]`, 12 bytes each, primitive space in metres.
         0 positions: u64,
+        /// The same of the last frame; equal to `positions` unless the mesh deforms.
+        8 previous_positions: u64,
         /// Device address of [`VertexAttributes`], same order.
-        8 attributes: u64,
+        16 attributes: u64,
         /// Device address of `u32[]`, already moved to the first index of this geometry.
-        16 indices: u64,
+        24 indices: u64,
         /// Number of triangles.
-        24 triangle_count: u32,
+        32 triangle_count: u32,
         /// `GEOMETRY_*` bits.
-        28 flags: u32,
+        36 flags: u32,
+        /// Zero.
+        40 pad0: u32,
+        /// Zero.
+        44 pad1: u32,
         /// Primitive space to mesh space.
-        32 mesh_from_primitive: Rows,
+        48 mesh_from_primitive: Rows,
+        /// The same of the last frame.
+        96 previous_mesh_from_primitive: Rows,
     }
 
     /// What a vertex carries beside its position.
@@ -358,8 +366,17 @@ pub const INSTANCE_MIRRORED: u32 = 1;
 /// Bit of y in the id target: the back side of the triangle was seen.
 pub const GBUFFER_BACK: u32 = 0x8000_0000;
 
-/// [`Geometry::flags`]: `mesh_from_primitive` is not the identity.
+/// [`Geometry::flags`]: `mesh_from_primitive` is not the identity, now or in the last frame.
 pub const GEOMETRY_MOVED: u32 = 1;
+/// [`Geometry::flags`]: the previous vertices or matrix differ from the present ones.
+pub const GEOMETRY_MOVING: u32 = 2;
+
+/// Bit of an instance mask: met by camera rays.
+pub const MASK_CAMERA: u32 = 1;
+/// Bit of an instance mask: met by shadow rays.
+pub const MASK_SHADOWS: u32 = 2;
+/// Bit of an instance mask: met by reflections and refractions.
+pub const MASK_INDIRECT: u32 = 4;
 
 /// [`Light::kind`].
 pub const LIGHT_POINT: u32 = 0;

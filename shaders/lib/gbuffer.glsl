@@ -59,7 +59,7 @@ GbufferPixel gbuffer_pixel(Frame frame, Scene scene, uvec2 pixel, uint instance_
     Surface surface = surface_shade(material, point, front, attributes, textures_at, -ray.direction);
 
     vec4 clip = frame.clip_from_render_unjittered * vec4(point.position, 1.0);
-    vec3 previous = triangle_previous_position(scene, instance_slot, triangle, barycentric);
+    vec3 previous = triangle_previous_position(scene, instance_slot, geometry, triangle, barycentric);
     GbufferPixel result;
     result.id = uvec4(instance_slot + 1u, geometry | (front ? 0u : GBUFFER_BACK), primitive, material_slot);
     result.normal = uvec2(octahedral_encode(surface.shading_normal), octahedral_encode(surface.geometric_normal));

@@ -17,7 +17,7 @@ vec3 light_visibility(vec3 origin, vec3 direction, float t_max_m, uint seed) {
     shadow_payload.visible = 0u;
     shadow_payload.seed = seed;
     const uint flags = gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT;
-    traceRayEXT(scene_tlas, flags, MASK_ALL, RAY_SHADOW, 0, RAY_SHADOW, origin, 0.0, direction, t_max_m, 1);
+    traceRayEXT(scene_tlas, flags, MASK_SHADOWS, RAY_SHADOW, 0, RAY_SHADOW, origin, 0.0, direction, t_max_m, 1);
     if (shadow_payload.visible == 0u) {
         return vec3(0.0);
     }

@@ -71,9 +71,19 @@ SurfacePoint triangle_point(Triangle triangle, vec2 barycentric) {
 }
 
 // Where the point was in the last frame: render space.
-vec3 triangle_previous_position(Scene scene, uint instance_slot, Triangle triangle, vec2 barycentric) {
+vec3 triangle_previous_position(Scene scene, uint instance_slot, uint geometry_index, Triangle triangle, vec2 barycentric) {
     Instance instance = InstanceTable(scene.instances).at[instance_slot];
-    vec3 mesh_position = triangle.v0 + barycentric.x * (triangle.v1 - triangle.v0) + barycentric.y * (triangle.v2 - triangle.v0);
+    Geometry geometry = GeometryTable(instance.geometries).at[geometry_index];
+    vec3 v0 = triangle.v0;
+    vec3 v1 = triangle.v1;
+    vec3 v2 = triangle.v2;
+    if ((geometry.flags & GEOMETRY_MOVING) != 0u) {
+        PositionTable positions = PositionTable(geometry.previous_positions);
+        v0 = transform_point(geometry.previous_mesh_from_primitive, positions.at[triangle.index.x]);
+        v1 = transform_point(geometry.previous_mesh_from_primitive, positions.at[triangle.index.y]);
+        v2 = transform_point(geometry.previous_mesh_from_primitive, positions.at[triangle.index.z]);
+    }
+    vec3 mesh_position = v0 + barycentric.x * (v1 - v0) + barycentric.y * (v2 - v0);
     return transform_point(instance.previous_render_from_mesh, mesh_position);
 }
 

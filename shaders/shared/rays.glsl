@@ -10,8 +10,10 @@ layout(set = 0, binding = 0) uniform accelerationStructureEXT scene_tlas;
 const uint RAY_SURFACE = 0u;
 const uint RAY_SHADOW = 1u;
 
-// Instance masks.
-const uint MASK_ALL = 0xffu;
+// Bits of the instance masks, one a kind of ray. A hidden instance has none.
+const uint MASK_CAMERA = 1u;
+const uint MASK_SHADOWS = 2u;
+const uint MASK_INDIRECT = 4u;      // reflections and refractions
 
 // Filled by surface.rchit / surface.rmiss. Fixed size, nothing shaded: ray generation does the shading.
 struct SurfacePayload {

@@ -28,7 +28,8 @@ const uint MATERIAL_ALPHA_BLEND = 8u;
 const uint INSTANCE_MIRRORED = 1u;  // determinant below 0: the winding seen in render space is turned over
 
 // Geometry.flags
-const uint GEOMETRY_MOVED = 1u;     // mesh_from_primitive is not the identity
+const uint GEOMETRY_MOVED = 1u;     // mesh_from_primitive is not the identity, now or in the last frame
+const uint GEOMETRY_MOVING = 2u;    // the previous vertices or matrix differ from the present ones
 
 // Light.kind
 const uint LIGHT_POINT = 0u;
@@ -46,13 +47,18 @@ struct Instance {
     uint pad0;
 };
 
+// The builder of acceleration structures reads mesh_from_primitive in place, 16-byte aligned: offset and size are multiples of 16.
 struct Geometry {
     uint64_t positions;         // address of vec3[] (12 bytes each), mesh space before mesh_from_primitive
+    uint64_t previous_positions; // the same of the last frame; equal to `positions` unless the mesh deforms
     uint64_t attributes;        // address of VertexAttributes[], same order
     uint64_t indices;           // address of uint[], already moved to the first index of this geometry
     uint triangle_count;
     uint flags;
+    uint pad0;
+    uint pad1;
     vec4 mesh_from_primitive[3];
+    vec4 previous_mesh_from_primitive[3];
 };
 
 struct VertexAttributes {

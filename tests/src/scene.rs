@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use caustica_renderer::delta::{
     AlphaMode, Camera, Environment, Geometry, Instance, InstanceId, Light, LightId, Material, MaterialId,
-    Mesh, MeshId, Projection, Sampler, SceneDelta, ShadingMode, Texture, TextureId, TextureUse,
+    Mesh, MeshId, Projection, Sampler, SceneDelta, ShadingMode, Texture, TextureId, TextureUse, Visibility,
 };
 use glam::{Affine3A, Vec2, Vec3, Vec4};
 
@@ -59,8 +59,13 @@ impl Scene {
         let geometries =
             self.delta.meshes.iter().find(|(id, _)| *id == mesh).map_or(1, |(_, mesh)| mesh.geometries.len());
         let id = InstanceId { node: self.number(), part: 0 };
-        let instance =
-            Instance { mesh, render_from_mesh, materials: vec![material; geometries], visible: true };
+        let instance = Instance {
+            mesh,
+            render_from_mesh,
+            materials: vec![material; geometries],
+            visibility: Visibility::default(),
+            pose: None,
+        };
         self.delta.instances.push((id, instance));
         id
     }
@@ -139,6 +144,7 @@ pub fn mesh_of(
         tex_coords1: Vec::new(),
         colors: Vec::new(),
         geometries: vec![geometry],
+        deformation: None,
         positions,
         normals,
         tex_coords0,

@@ -2,7 +2,7 @@
 //! a scene with and without what cannot be seen.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
-use caustica_renderer::delta::{Geometry, Instance, InstanceId, SceneDelta};
+use caustica_renderer::delta::{Geometry, Instance, InstanceId, SceneDelta, Visibility};
 use caustica_renderer::{Accumulated, NeedsMode, Pipeline, ViewSettings};
 use caustica_tests::scene::{Scene, camera_parallel, glass, lambert, point_light, quad, sphere, zoo};
 use caustica_tests::studio::Studio;
@@ -129,8 +129,15 @@ fn what_cannot_be_seen_changes_nothing_else() {
         assert!(differing(&without, &shown, 1e-2) > 300, "{}", pipeline.name());
         let instance =
             scene.delta.instances.iter().find(|(other, _)| *other == id).expect("the instance").1.clone();
-        let with = |visible, render_from_mesh| SceneDelta {
-            instances: vec![(id, Instance { visible, render_from_mesh, ..instance.clone() })],
+        let with = |shown, render_from_mesh| SceneDelta {
+            instances: vec![(
+                id,
+                Instance {
+                    visibility: Visibility { shown, ..Visibility::default() },
+                    render_from_mesh,
+                    ..instance.clone()
+                },
+            )],
             ..SceneDelta::default()
         };
         for (name, visible, transform) in unseen() {

@@ -58,6 +58,7 @@ pub fn mesh_of(mesh: &scene::Mesh) -> delta::Mesh {
                 mesh_from_primitive: render_from(&primitive.mesh_from_primitive, DVec3::ZERO),
             })
             .collect(),
+        deformation: None,
     }
 }
 

@@ -13,14 +13,14 @@ use caustica_gpu::{
 use glam::DVec3;
 
 use super::blas::{BlasKey, Scratch};
+use crate::delta::Visibility;
 use crate::error::{RendererError, Result};
+use crate::gpu_types::{MASK_CAMERA, MASK_INDIRECT, MASK_SHADOWS};
 use crate::measure::TlasWork;
 use crate::tables::{Changed, Slot, Table, Tables};
 
 /// VK_GEOMETRY_INSTANCE_TRIANGLE_FACING_CULL_DISABLE_BIT_KHR.
 const CULL_DISABLE: u8 = 1;
-/// Seen by every ray.
-const MASK_ALL: u8 = 0xff;
 
 /// One VkAccelerationStructureInstanceKHR.
 #[derive(Clone, Copy, Pod, Zeroable, PartialEq)]
@@ -185,6 +185,13 @@ impl Tlas {
     }
 }
 
+/// Which rays meet an instance.
+fn mask_of(visibility: Visibility) -> u8 {
+    let Visibility { shown, to_camera, to_shadows } = visibility;
+    let bits = [(true, MASK_INDIRECT), (to_camera, MASK_CAMERA), (to_shadows, MASK_SHADOWS)];
+    bits.iter().filter(|(set, _)| shown && *set).fold(0, |mask, (_, bit)| mask | *bit as u8)
+}
+
 fn descriptor_of(slot: u32, entry: &Slot, tables: &Tables, blas_of: &impl Fn(&BlasKey) -> u64) -> Descriptor {
     let both_sides = entry.instance.materials.iter().enumerate().any(|(geometry, id)| {
         let turned = tables
@@ -195,7 +202,7 @@ fn descriptor_of(slot: u32, entry: &Slot, tables: &Tables, blas_of: &impl Fn(&Bl
     });
     // Facing is judged in object space, where glTF's front is Vulkan's without the flip flag.
     let flags = if both_sides { CULL_DISABLE } else { 0 };
-    let mask = if entry.instance.visible { MASK_ALL } else { 0 };
+    let mask = mask_of(entry.instance.visibility);
     let blas = if entry.degenerate { 0 } else { blas_of(&BlasKey::of(entry, &tables.materials)) };
     // A NaN must not reach the device even in an inactive instance.
     let transform = if entry.degenerate { glam::Affine3A::IDENTITY } else { entry.instance.render_from_mesh };

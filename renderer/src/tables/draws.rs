@@ -49,7 +49,7 @@ impl Draws {
         let mut lists: BTreeMap<BatchKey, Vec<u32>> = BTreeMap::new();
         self.mirrored.clear();
         for (slot, entry) in instances.iter() {
-            if !entry.instance.visible || entry.degenerate {
+            if !entry.instance.visibility.shown || entry.degenerate {
                 continue;
             }
             let Ok(mesh) = meshes.get(entry.instance.mesh) else { continue };
@@ -91,7 +91,7 @@ impl Draws {
         let flipped = moved.iter().any(|slot| {
             let now = instances
                 .get(*slot)
-                .filter(|entry| entry.instance.visible && !entry.degenerate)
+                .filter(|entry| entry.instance.visibility.shown && !entry.degenerate)
                 .map(|_| instances.is_mirrored(*slot));
             now != self.mirrored.get(slot).copied()
         });

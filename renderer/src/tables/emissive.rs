@@ -37,7 +37,7 @@ impl Emissive {
         self.instances.clear();
         for (slot, entry) in instances.iter() {
             let emitter = entry.instance.materials.iter().any(|id| materials.get(*id).is_some_and(emits));
-            if !emitter || !entry.instance.visible {
+            if !emitter || !entry.instance.visibility.shown {
                 continue;
             }
             // A degenerate emitter is followed too: it may get a size again.

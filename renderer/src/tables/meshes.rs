@@ -95,11 +95,14 @@ impl Meshes {
             .iter()
             .map(|geometry| gpu_types::Geometry {
                 positions: positions.address(),
+                previous_positions: positions.address(),
                 attributes: attribute_buffer.address(),
                 indices: indices.address() + u64::from(geometry.first_index) * 4,
                 triangle_count: geometry.index_count / 3,
                 flags: if geometry.mesh_from_primitive == Affine3A::IDENTITY { 0 } else { GEOMETRY_MOVED },
                 mesh_from_primitive: rows_of(&geometry.mesh_from_primitive),
+                previous_mesh_from_primitive: rows_of(&geometry.mesh_from_primitive),
+                ..bytemuck::Zeroable::zeroed()
             })
             .collect();
         let geometries = make("geometries", size_of_val(records.as_slice()))?;

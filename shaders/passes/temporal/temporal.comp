@@ -105,7 +105,7 @@ float expected_depth(Frame frame, Scene scene, uvec2 pixel, uvec4 id) {
     CameraRay ray = camera_ray(frame, camera_sample_position(frame, pixel));
     Triangle triangle = triangle_fetch(scene, id.x - 1u, id.y & ~GBUFFER_BACK, id.z);
     vec2 barycentric = clamp_barycentric(triangle_line_barycentric(triangle, ray.origin, ray.direction));
-    vec3 position = triangle_previous_position(scene, id.x - 1u, triangle, barycentric);
+    vec3 position = triangle_previous_position(scene, id.x - 1u, id.y & ~GBUFFER_BACK, triangle, barycentric);
     vec4 clip = frame.previous_clip_from_render * vec4(position, 1.0);
     return clip.w > 0.0 ? clip.z / clip.w : -1.0;
 }

@@ -2,7 +2,11 @@
 //! In: nothing. Out: plain-old-data types whose size and field offsets are asserted at compile time, and
 //! [`twins`], the same numbers as data, for the test against SPIR-V reflection. Knows no table and no Vulkan.
 
+mod constants;
+
 use bytemuck::{Pod, Zeroable};
+
+pub use constants::*;
 
 /// Three rows of a 3x4 affine map: `p' = (dot(row.xyz, p) + row.w, ...)`.
 pub type Rows = [[f32; 4]; 3];
@@ -337,111 +341,92 @@ twins! {
         /// Pass-specific.
         12 argument1: u32,
     }
+
+    /// What pass `deform` makes of one instance.
+    struct DeformJob, size 72 {
+        /// Positions of the mesh at rest.
+        0 rest_positions: u64,
+        /// [`VertexAttributes`] of the mesh at rest.
+        8 rest_attributes: u64,
+        /// [`JointInfluences`] a vertex; 0: no joint moves it.
+        16 influences: u64,
+        /// [`Rows`] a joint, mesh space at rest to mesh space as posed.
+        24 joints: u64,
+        /// [`MorphUse`] `[target_count]`.
+        32 targets: u64,
+        /// Positions of the last evaluation, then of this one.
+        40 positions: u64,
+        /// Takes over what `positions` held; 0: not wanted.
+        48 previous_positions: u64,
+        /// [`VertexAttributes`] as posed.
+        56 attributes: u64,
+        /// Number of vertices.
+        64 vertex_count: u32,
+        /// Number of targets with a weight.
+        68 target_count: u32,
+    }
+
+    /// A morph target with its weight; a list whose address is 0 holds no offsets.
+    struct MorphUse, size 32 {
+        /// `vec3` a vertex.
+        0 positions: u64,
+        /// `vec3` a vertex.
+        8 normals: u64,
+        /// `vec3` a vertex.
+        16 tangents: u64,
+        /// Multiplies the offsets.
+        24 weight: f32,
+        /// Zero.
+        28 pad0: u32,
+    }
+
+    /// The joints that move a vertex, the heaviest first.
+    struct JointInfluences, size 24 {
+        /// Joints 0 (low half) and 1.
+        0 joints_01: u32,
+        /// Joints 2 (low half) and 3.
+        4 joints_23: u32,
+        /// Weights in sum 1; all 0: the vertex stays where it is.
+        8 weights: [f32; 4],
+    }
+
+    /// Which instance descriptors are written.
+    struct InstanceDescriptorJob, size 48 {
+        /// [`Instance`] by slot.
+        0 instances: u64,
+        /// [`TlasSlot`] by slot.
+        8 slots: u64,
+        /// Device addresses by BLAS number; 0: not built.
+        16 blases: u64,
+        /// [`InstanceDescriptor`] by place.
+        24 descriptors: u64,
+        /// `count` slots; 0: the slots `0..count`.
+        32 dirty: u64,
+        /// Number of slots.
+        40 count: u32,
+        /// Zero.
+        44 pad0: u32,
+    }
+
+    /// What the TLAS knows of a slot beside its transform.
+    struct TlasSlot, size 12 {
+        /// Number of its BLAS, or [`TLAS_NO_BLAS`].
+        0 blas: u32,
+        /// Bits 0..8: `MASK_*`; bits 8..16: VkGeometryInstanceFlagsKHR.
+        4 mask_flags: u32,
+        /// Of its descriptor.
+        8 place: u32,
+    }
+
+    /// VkAccelerationStructureInstanceKHR.
+    struct InstanceDescriptor, size 64 {
+        /// Mesh space to render space; the identity where nothing is to be met.
+        0 render_from_mesh: Rows,
+        /// Bits 0..24: slot; bits 24..32: mask.
+        48 index_mask: u32,
+        /// Bits 24..32: flags.
+        52 offset_flags: u32,
+        /// Device address of the BLAS; 0: rays never meet it.
+        56 blas: u64,
+    }
 }
-
-/// [`TextureUse::texture`] of a slot without a texture.
-pub const NO_TEXTURE: u32 = 0xffff_ffff;
-
-/// [`Material::mode`]: glTF metallic-roughness.
-pub const MODE_PBR: u32 = 0;
-/// [`Material::mode`]: perfect mirror.
-pub const MODE_REFLECTIVE: u32 = 1;
-/// [`Material::mode`]: smooth glass.
-pub const MODE_REFRACTIVE: u32 = 2;
-/// [`Material::mode`]: base colour without light.
-pub const MODE_UNLIT: u32 = 3;
-
-/// [`Material::flags`]: both sides are seen and emit.
-pub const MATERIAL_DOUBLE_SIDED: u32 = 1;
-/// [`Material::flags`]: the surface encloses a volume, light bends at it.
-pub const MATERIAL_HAS_VOLUME: u32 = 2;
-/// [`Material::flags`]: alpha below the cut-off is a hole.
-pub const MATERIAL_ALPHA_MASK: u32 = 4;
-/// [`Material::flags`]: alpha is coverage.
-pub const MATERIAL_ALPHA_BLEND: u32 = 8;
-
-/// [`Instance::flags`]: the determinant of `render_from_mesh` is below 0.
-pub const INSTANCE_MIRRORED: u32 = 1;
-
-/// Bit of y in the id target: the back side of the triangle was seen.
-pub const GBUFFER_BACK: u32 = 0x8000_0000;
-
-/// [`Geometry::flags`]: `mesh_from_primitive` is not the identity, now or in the last frame.
-pub const GEOMETRY_MOVED: u32 = 1;
-/// [`Geometry::flags`]: the previous vertices or matrix differ from the present ones.
-pub const GEOMETRY_MOVING: u32 = 2;
-
-/// Bit of an instance mask: met by camera rays.
-pub const MASK_CAMERA: u32 = 1;
-/// Bit of an instance mask: met by shadow rays.
-pub const MASK_SHADOWS: u32 = 2;
-/// Bit of an instance mask: met by reflections and refractions.
-pub const MASK_INDIRECT: u32 = 4;
-
-/// [`Light::kind`].
-pub const LIGHT_POINT: u32 = 0;
-/// [`Light::kind`].
-pub const LIGHT_SPOT: u32 = 1;
-/// [`Light::kind`].
-pub const LIGHT_DIRECTIONAL: u32 = 2;
-
-/// [`Frame::flags`]: parallel projection.
-pub const FRAME_ORTHOGRAPHIC: u32 = 1;
-/// [`Frame::flags`]: post shows the denoised signals of this frame, not the accumulated mean.
-pub const FRAME_MOVING: u32 = 2;
-/// [`Frame::flags`]: the history belongs to the last frame and may be reprojected.
-pub const FRAME_HISTORY: u32 = 4;
-/// [`Frame::flags`]: shadow rays stop at refractive surfaces.
-pub const FRAME_OPAQUE_GLASS: u32 = 8;
-
-/// [`Frame::tone_map`]: clamp.
-pub const TONE_MAP_LINEAR: u32 = 0;
-/// [`Frame::tone_map`]: fit to the ACES reference transform.
-pub const TONE_MAP_ACES: u32 = 1;
-/// [`Frame::tone_map`]: approximation of AgX.
-pub const TONE_MAP_AGX: u32 = 2;
-/// [`Frame::tone_map`]: Khronos PBR neutral.
-pub const TONE_MAP_NEUTRAL: u32 = 3;
-
-/// Debug view ([`Push::argument0`] of the pass `show`): source = base colour target.
-pub const SHOW_BASE_COLOR: u32 = 0;
-/// Debug view: source_uint = normal target.
-pub const SHOW_NORMAL: u32 = 1;
-/// Debug view: source_uint = normal target.
-pub const SHOW_GEOMETRIC_NORMAL: u32 = 2;
-/// Debug view: source = depth.
-pub const SHOW_DEPTH: u32 = 3;
-/// Debug view: source = material target.
-pub const SHOW_METALLIC: u32 = 4;
-/// Debug view: source = material target.
-pub const SHOW_ROUGHNESS: u32 = 5;
-/// Debug view: source = motion target.
-pub const SHOW_MOTION: u32 = 6;
-/// Debug view: source = emissive target.
-pub const SHOW_EMISSIVE: u32 = 7;
-/// Debug view: source_uint = id target.
-pub const SHOW_INSTANCE: u32 = 8;
-/// Debug view: source = a light signal, exposed and tone mapped.
-pub const SHOW_LIGHT: u32 = 9;
-/// Debug view: source = a temporal history, its length is shown.
-pub const SHOW_HISTORY: u32 = 10;
-/// Debug view: source = base colour target.
-pub const SHOW_OCCLUSION: u32 = 11;
-/// Debug view: source_uint = id target.
-pub const SHOW_MATERIAL: u32 = 12;
-/// Debug view: source_uint = id target.
-pub const SHOW_TRIANGLE: u32 = 13;
-
-/// Hit group and miss shader of rays that look for a surface (`RAY_SURFACE`).
-pub const RAY_SURFACE: u32 = 0;
-/// Hit group and miss shader of rays that ask for visibility (`RAY_SHADOW`).
-pub const RAY_SHADOW: u32 = 1;
-/// Instance mask of what every ray sees.
-pub const MASK_ALL: u32 = 0xff;
-
-/// Set 0: the TLAS.
-pub const BINDING_TLAS: u32 = 0;
-/// Set 0: the bindless textures.
-pub const BINDING_TEXTURES: u32 = 1;
-/// Set 0: the environment map.
-pub const BINDING_ENVIRONMENT_MAP: u32 = 2;

@@ -2,7 +2,11 @@
 //! This file holds what they share: how pipelines are built, and what a pass may touch.
 
 mod accumulate;
+#[expect(dead_code, reason = "the tables call it once they hold deforming instances")]
+mod deform;
 mod gbuffer;
+#[expect(dead_code, reason = "the TLAS calls it once its records are on the device")]
+mod instance_descriptors;
 mod post;
 mod shading;
 mod shadow;
@@ -17,7 +21,10 @@ use caustica_gpu::{
 };
 
 pub(crate) use accumulate::Accumulate;
+pub(crate) use deform::Deform;
 pub(crate) use gbuffer::GBuffer;
+#[expect(unused_imports, reason = "the TLAS calls it once its records are on the device")]
+pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
 pub(crate) use post::Post;
 pub(crate) use shading::Shading;
 pub(crate) use shadow::Shadow;
@@ -88,6 +95,25 @@ impl Builder<'_> {
         };
         Ok(RayTracingPipeline::new(self.device, &desc, &interface, &self.specialization, Some(self.set))?)
     }
+}
+
+/// Builds a pass that works on tables alone: no scene set, no needs.
+fn table_pass(
+    device: &Arc<Device>,
+    library: &mut ShaderLibrary,
+    label: &str,
+    file: &str,
+) -> Result<ComputePipeline> {
+    let stage = library.stage(file)?;
+    let general = Specialization::default();
+    Ok(ComputePipeline::new(device, label, &stage.module, &stage.interface, &general, None)?)
+}
+
+/// Groups of 64 that go through `count` entries of a table; the shader takes several steps where they are too few.
+fn table_groups(count: u32) -> [u32; 3] {
+    /// What every device allows (Vulkan 1.3, maxComputeWorkGroupCount).
+    const MOST_GROUPS: u32 = 65535;
+    [count.div_ceil(64).min(MOST_GROUPS), 1, 1]
 }
 
 /// What the passes of one frame may touch.

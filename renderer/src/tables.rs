@@ -2,6 +2,9 @@
 //! and what the acceleration structures and `needs` want to know. Only what changed is uploaded.
 
 pub(crate) mod alias;
+mod deformation;
+#[expect(dead_code, reason = "the tables call it once they hold deforming instances")]
+mod deforming;
 mod draws;
 mod emissive;
 mod environment;

@@ -170,6 +170,15 @@ fn structs_lie_alike_on_both_sides() {
     assert!(unseen.is_empty(), "no shader uses {unseen:?}");
 }
 
+/// Every file of `shaders/shared`.
+fn shared_files() -> Vec<String> {
+    let folder = std::fs::read_dir(shader_folder().join("shared")).expect("the shared shaders");
+    let mut found: Vec<String> =
+        folder.flatten().map(|file| format!("shared/{}", file.file_name().to_string_lossy())).collect();
+    found.sort();
+    found
+}
+
 /// `NAME = VALUE` of every `u32` constant in a text.
 fn constants(text: &str, beginning: &str, separator: &str) -> BTreeMap<String, u32> {
     let mut found = BTreeMap::new();
@@ -191,14 +200,17 @@ fn constants(text: &str, beginning: &str, separator: &str) -> BTreeMap<String, u
 
 #[test]
 fn constants_are_the_same_on_both_sides() {
-    let host_text =
-        std::fs::read_to_string(repository().join("renderer/src/gpu_types.rs")).expect("the host twins");
+    let host_file = repository().join("renderer/src/gpu_types/constants.rs");
+    let host_text = std::fs::read_to_string(host_file).expect("the host twins");
     let host = constants(&host_text, "pub const ", ": u32 =");
     let mut device = BTreeMap::new();
-    for file in ["scene", "frame", "rays", "textures", "needs"] {
-        device.extend(constants(&shader_text(&format!("shared/{file}.glsl")), "const uint ", "="));
+    for file in shared_files() {
+        device.extend(constants(&shader_text(&file), "const uint ", "="));
     }
     assert!(device.len() > 30, "only {} constants were found", device.len());
+    for beginning in ["MASK_", "GEOMETRY_", "TLAS_", "RAY_", "SHOW_"] {
+        assert!(device.keys().any(|name| name.starts_with(beginning)), "no {beginning}* was found");
+    }
     for (name, value) in &device {
         assert_eq!(host.get(name), Some(value), "{name} of shaders/shared on the host");
     }

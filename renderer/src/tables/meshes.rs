@@ -3,23 +3,27 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use caustica_gpu::{Buffer, BufferUse, Device, Location, MemoryUse, Recorder};
+use caustica_gpu::{Buffer, BufferUse, Device, Location, MemoryUse, Recorder, ResourceId};
 use glam::{Affine3A, Vec3};
 
+use super::deformation::DeformationBuffers;
 use super::spatial_order::sort_triangles;
 use crate::delta::{Mesh, MeshId};
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{self, GEOMETRY_MOVED, Rows, VertexAttributes};
 
 /// Offset of `mesh_from_primitive` inside a geometry record; acceleration structure builds read it there.
-const TRANSFORM_OFFSET: u64 = std::mem::offset_of!(gpu_types::Geometry, mesh_from_primitive) as u64;
+pub(super) const TRANSFORM_OFFSET: u64 =
+    std::mem::offset_of!(gpu_types::Geometry, mesh_from_primitive) as u64;
 
 /// One mesh on the device.
 pub(crate) struct GpuMesh {
     positions: Buffer,
-    _attributes: Buffer,
+    attributes: Buffer,
     pub(crate) indices: Buffer,
     geometries: Buffer,
+    /// How it deforms; `None`: rigid.
+    pub(super) deformation: Option<Arc<DeformationBuffers>>,
     /// The content, for emissive triangles and statistics.
     pub(crate) host: Arc<Mesh>,
     /// Middle of its bounds, mesh space.
@@ -30,6 +34,21 @@ impl GpuMesh {
     /// Address of the geometry records.
     pub(crate) fn geometries_address(&self) -> u64 {
         self.geometries.address()
+    }
+
+    /// Address of the positions: of a mesh that deforms, at rest.
+    pub(super) fn positions_address(&self) -> u64 {
+        self.positions.address()
+    }
+
+    /// Address of the vertex attributes: of a mesh that deforms, at rest.
+    pub(super) fn attributes_address(&self) -> u64 {
+        self.attributes.address()
+    }
+
+    /// A number that no other content of this or another mesh has had.
+    pub(super) fn content(&self) -> ResourceId {
+        self.positions.id()
     }
 
     /// Number of primitives.
@@ -71,6 +90,7 @@ impl Meshes {
     /// Uploads a mesh, or its new content.
     pub(crate) fn set(&mut self, recorder: &mut Recorder, id: MeshId, mesh: &Arc<Mesh>) -> Result<()> {
         check(mesh, &self.device)?;
+        let deformation = DeformationBuffers::new(&self.device, recorder, mesh)?.map(Arc::new);
         let mesh = &Arc::new(in_spatial_order(mesh));
         let make = |what: &str, size: usize| {
             let name = format!("{} {what}", mesh.name);
@@ -111,7 +131,15 @@ impl Meshes {
         let centre = centre_of(&host);
         self.by_id.insert(
             id,
-            GpuMesh { positions, _attributes: attribute_buffer, indices, geometries, host, centre },
+            GpuMesh {
+                positions,
+                attributes: attribute_buffer,
+                indices,
+                geometries,
+                deformation,
+                host,
+                centre,
+            },
         );
         Ok(())
     }

@@ -3,6 +3,7 @@
 
 mod accumulate;
 mod gbuffer;
+mod instance_descriptors;
 mod post;
 mod shading;
 mod shadow;
@@ -18,6 +19,7 @@ use caustica_gpu::{
 
 pub(crate) use accumulate::Accumulate;
 pub(crate) use gbuffer::GBuffer;
+pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
 pub(crate) use post::Post;
 pub(crate) use shading::Shading;
 pub(crate) use shadow::Shadow;
@@ -90,6 +92,18 @@ impl Builder<'_> {
     }
 }
 
+/// A compute pipeline that reads tables by address alone, without set 0 and without needs.
+fn scene_compute(
+    device: &Arc<Device>,
+    library: &mut ShaderLibrary,
+    label: &str,
+    file: &str,
+) -> Result<ComputePipeline> {
+    let stage = library.stage(file)?;
+    let general = Specialization::default();
+    Ok(ComputePipeline::new(device, label, &stage.module, &stage.interface, &general, None)?)
+}
+
 /// What the passes of one frame may touch.
 pub(crate) struct Scope<'a> {
     pub(crate) tables: &'a Tables,
@@ -146,6 +160,17 @@ impl Scope<'_> {
             recorder.trace_rays(pipeline, Some(self.set), binds, &uses, bytemuck::bytes_of(&push), size)
         })?;
         Ok(())
+    }
+}
+
+/// The passes that bring the scene itself up to date, whatever the views show.
+pub(crate) struct ScenePasses {
+    pub(crate) instance_descriptors: InstanceDescriptors,
+}
+
+impl ScenePasses {
+    pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
+        Ok(Self { instance_descriptors: InstanceDescriptors::new(device, library)? })
     }
 }
 

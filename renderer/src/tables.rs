@@ -2,6 +2,7 @@
 //! and what the acceleration structures and `needs` want to know. Only what changed is uploaded.
 
 pub(crate) mod alias;
+mod deforming;
 mod draws;
 mod emissive;
 mod environment;
@@ -9,40 +10,63 @@ mod instances;
 mod lights;
 mod materials;
 mod meshes;
+mod snapshot;
 mod spatial_order;
 mod table;
 mod textures;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use caustica_gpu::{Access, Device, Recorder, ResourceId, Stage, Use};
 
-pub(crate) use draws::Batch;
+pub(crate) use draws::{Batch, BatchKey};
 pub(crate) use instances::{Instances, Slot};
-pub(crate) use materials::{Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits};
+pub(crate) use materials::{
+    MaterialChange, Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits,
+};
 pub(crate) use meshes::{Meshes, rows_of};
+pub(crate) use snapshot::Snapshot;
 pub(crate) use spatial_order::order_of;
 pub(crate) use table::Table;
 
-use crate::delta::SceneDelta;
+use crate::delta::{InstanceId, MaterialId, MeshId, SceneDelta};
 use crate::error::Result;
 use crate::gpu_types;
 
+use deforming::Deforming;
 use draws::Draws;
 use emissive::Emissive;
 use environment::EnvironmentTable;
 use lights::Lights;
 use textures::Textures;
 
-/// What changed on the device by one delta, for the acceleration structures.
+/// What changed on the device, for the acceleration structures.
 #[derive(Debug, Default)]
 pub(crate) struct Changed {
-    /// Instances were added, removed, or got another mesh, material opacity or visibility.
-    pub(crate) structure: bool,
+    /// Everything is to be looked at anew, after an error.
+    pub(crate) all: bool,
+    /// Slots that are new or free, or of another mesh, material or visibility.
+    pub(crate) slots: BTreeSet<u32>,
     /// Slots of which the transform changed.
     pub(crate) moved: Vec<u32>,
-    /// Meshes that are new or changed.
-    pub(crate) meshes: Vec<crate::delta::MeshId>,
+    /// Meshes with new content.
+    pub(crate) meshes: BTreeSet<MeshId>,
+    /// Meshes with primitives that moved.
+    pub(crate) reshaped: BTreeSet<MeshId>,
+    /// Instances whose vertices were evaluated anew.
+    pub(crate) deformed: Vec<InstanceId>,
+}
+
+impl Changed {
+    pub(crate) fn is_empty(&self) -> bool {
+        !self.all
+            && self.slots.is_empty()
+            && self.moved.is_empty()
+            && self.meshes.is_empty()
+            && self.reshaped.is_empty()
+            && self.deformed.is_empty()
+    }
 }
 
 /// The scene on the device.
@@ -55,6 +79,7 @@ pub(crate) struct Tables {
     pub(crate) emissive: Emissive,
     pub(crate) environment: EnvironmentTable,
     pub(crate) draws: Draws,
+    pub(crate) deforming: Deforming,
     scene: Table<gpu_types::Scene>,
     /// Stands for every table in the barrier tracker: they are read by address, which no binding shows.
     group: ResourceId,
@@ -72,46 +97,43 @@ impl Tables {
             emissive: Emissive::new(device),
             environment: EnvironmentTable::new(device, recorder)?,
             draws: Draws::new(device),
+            deforming: Deforming,
             scene: Table::new(device, "scene"),
             group: device.new_resource_id(),
             geometry_group: device.new_resource_id(),
         })
     }
 
-    /// Takes a delta in; the caller uploads with [`Self::flush`] in the same frame.
+    /// Takes a delta in and adds to `changed`; the caller uploads with [`Self::flush`] in the same frame.
     ///
     /// # Errors
     /// When the delta names what is not there, or memory runs out.
-    pub(crate) fn apply(&mut self, recorder: &mut Recorder, delta: &SceneDelta) -> Result<Changed> {
-        let mut changed = Changed::default();
-        if !delta.meshes.is_empty() || !delta.textures.is_empty() {
-            recorder.declare(&[Use::Group(self.geometry_group, Stage::Transfer, Access::TransferWrite)]);
-        }
-        for (id, mesh) in &delta.meshes {
-            self.meshes.set(recorder, *id, mesh)?;
-            changed.meshes.push(*id);
-        }
-        for (id, texture) in &delta.textures {
-            self.textures.set(recorder, *id, texture)?;
-        }
-        for id in &delta.removed_textures {
-            self.textures.remove(*id);
-        }
-        let mut flipped = false;
-        for (id, material) in &delta.materials {
-            flipped |= self.materials.set(*id, material, &self.textures);
-        }
-        for id in &delta.removed_materials {
-            self.materials.remove(*id);
-        }
+    pub(crate) fn apply(
+        &mut self,
+        recorder: &mut Recorder,
+        delta: &SceneDelta,
+        changed: &mut Changed,
+    ) -> Result<()> {
+        self.apply_assets(recorder, delta, changed)?;
         for id in &delta.removed_instances {
-            self.instances.remove(*id);
+            changed.slots.extend(self.instances.remove(*id));
         }
         for (id, instance) in &delta.instances {
-            self.instances.set(*id, instance, &self.meshes, &self.materials)?;
+            changed.slots.insert(self.instances.set(*id, instance, &self.meshes, &self.materials)?);
         }
+        let mut redrawn = changed.slots.clone();
         for (id, transform) in &delta.transforms {
-            changed.moved.extend(self.instances.set_transform(*id, *transform)?);
+            let (slot, turned) = self.instances.set_transform(*id, *transform)?;
+            changed.moved.push(slot);
+            self.emissive.follow_transform(slot, &self.instances);
+            if turned {
+                redrawn.insert(slot);
+            }
+        }
+        for (id, visibility) in &delta.visibility {
+            let slot = self.instances.set_visibility(*id, *visibility)?;
+            changed.slots.insert(slot);
+            redrawn.insert(slot);
         }
         for id in &delta.removed_meshes {
             self.meshes.remove(*id);
@@ -120,24 +142,87 @@ impl Tables {
         if let Some(environment) = &delta.environment {
             self.environment.set(recorder, environment)?;
         }
-        if !delta.meshes.is_empty() {
-            self.instances.follow_meshes(&changed.meshes, &self.meshes)?;
+        for slot in redrawn {
+            self.draws.follow(slot, &self.instances, &self.materials, &self.meshes);
+            self.emissive.follow(slot, &self.instances, &self.materials);
         }
-        let instances_changed = !delta.instances.is_empty() || !delta.removed_instances.is_empty();
-        changed.structure = instances_changed || flipped || !delta.meshes.is_empty();
-        if changed.structure || !delta.materials.is_empty() {
-            self.draws.rebuild(&self.instances, &self.materials, &self.meshes);
-            self.emissive.rebuild(&self.instances, &self.materials, &self.meshes);
-        } else if !changed.moved.is_empty() {
-            self.emissive.follow_transforms(&changed.moved, &self.instances, &self.materials, &self.meshes);
-            self.draws.follow_mirrored(&changed.moved, &self.instances, &self.materials, &self.meshes);
+        if !delta.removed_instances.is_empty() {
+            self.instances.tidy();
+            self.draws.tidy();
         }
-        Ok(changed)
+        self.emissive.update(&self.instances, &self.materials, &self.meshes);
+        Ok(())
     }
 
-    /// Makes the previous transforms of what moved in the last frame equal to the present ones.
-    pub(crate) fn settle_transforms(&mut self) {
+    fn apply_assets(
+        &mut self,
+        recorder: &mut Recorder,
+        delta: &SceneDelta,
+        changed: &mut Changed,
+    ) -> Result<()> {
+        if !delta.meshes.is_empty() || !delta.textures.is_empty() {
+            recorder.declare(&[Use::Group(self.geometry_group, Stage::Transfer, Access::TransferWrite)]);
+        }
+        // Instances that must be looked at though the delta does not name them: of meshes that were replaced or
+        // turned over, of materials that became another kind.
+        let mut other_meshes: BTreeSet<MeshId> = BTreeSet::new();
+        let mut other_materials: BTreeSet<MaterialId> = BTreeSet::new();
+        for (id, mesh) in &delta.meshes {
+            if self.meshes.set(recorder, *id, mesh)? {
+                other_meshes.insert(*id);
+            }
+            changed.meshes.insert(*id);
+        }
+        for (id, geometry, map) in &delta.primitive_transforms {
+            if self.meshes.set_primitive(*id, *geometry, map)? {
+                other_meshes.insert(*id);
+            }
+            changed.reshaped.insert(*id);
+            if self.emissive.places(*id, &self.instances) {
+                self.emissive.mark_stale();
+            }
+        }
+        for (id, texture) in &delta.textures {
+            self.textures.set(recorder, *id, texture)?;
+        }
+        for id in &delta.removed_textures {
+            self.textures.remove(*id);
+        }
+        for (id, material) in &delta.materials {
+            match self.materials.set(*id, material, &self.textures) {
+                MaterialChange::Values => {}
+                MaterialChange::Emission => self.emissive.mark_stale(),
+                MaterialChange::Kind => {
+                    other_materials.insert(*id);
+                }
+            }
+        }
+        for id in &delta.removed_materials {
+            self.materials.remove(*id);
+        }
+        if !other_meshes.is_empty() || !other_materials.is_empty() {
+            let named = |entry: &Slot| {
+                other_meshes.contains(&entry.instance.mesh)
+                    || entry.instance.materials.iter().any(|id| other_materials.contains(id))
+            };
+            let found: Vec<(u32, MeshId)> = self
+                .instances
+                .iter()
+                .filter(|(_, entry)| named(entry))
+                .map(|(slot, entry)| (slot, entry.instance.mesh))
+                .collect();
+            for (slot, mesh) in found {
+                self.instances.set_geometries(slot, self.meshes.get(mesh)?.geometries_address());
+                changed.slots.insert(slot);
+            }
+        }
+        Ok(())
+    }
+
+    /// A frame has gone by: what moved in it has its present place as its previous one.
+    pub(crate) fn settle(&mut self) {
         self.instances.settle();
+        self.meshes.settle();
     }
 
     /// Uploads every changed entry.
@@ -155,6 +240,10 @@ impl Tables {
         ];
         if waits.contains(&true) {
             recorder.declare(&[Use::Group(self.group, Stage::Transfer, Access::TransferWrite)]);
+        }
+        if self.meshes.is_dirty() {
+            recorder.declare(&[Use::Group(self.geometry_group, Stage::Transfer, Access::TransferWrite)]);
+            self.meshes.flush(recorder)?;
         }
         self.instances.flush(recorder)?;
         self.materials.flush(recorder)?;
@@ -187,6 +276,17 @@ impl Tables {
     /// The use of the vertices as input of acceleration structure builds.
     pub(crate) fn build_input(&self) -> Use<'static> {
         Use::Group(self.geometry_group, Stage::AccelBuild, Access::BuildInput)
+    }
+
+    /// A copy of what a build in the background reads: of a mesh, or of an instance of it that deforms.
+    pub(crate) fn snapshot(
+        &self,
+        recorder: &mut Recorder,
+        mesh: MeshId,
+        _deforming: Option<InstanceId>,
+    ) -> Result<Snapshot> {
+        let mesh = self.meshes.get(mesh)?;
+        Snapshot::new(recorder, &mesh.vertices, &mesh.geometries, None, self.geometry_group)
     }
 
     fn record(&self) -> gpu_types::Scene {

@@ -31,7 +31,7 @@ impl Studio {
     /// When the device cannot.
     pub fn with_window(extent: [u32; 2], settings: ViewSettings, window: bool) -> Self {
         let mut session = session();
-        let options = RendererOptions { shaders: shaders_under_test() };
+        let options = RendererOptions { shaders: shaders_under_test(), ..RendererOptions::default() };
         let mut renderer = Renderer::new(&session.device, &mut session.frames, &options).expect("a renderer");
         let view = renderer.create_view(extent, settings, window).expect("a view");
         Self { renderer, view, session }

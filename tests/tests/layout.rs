@@ -155,7 +155,7 @@ fn structs_lie_alike_on_both_sides() {
         reflect(&file, &words).expect("its interface fits the host");
         let module = Module::parse(&words);
         for (id, name, fields) in module.structs() {
-            let Some(twin) = twins().iter().find(|twin| twin.name == name) else { continue };
+            let Some(twin) = twins().find(|twin| twin.name == name) else { continue };
             let expected: Vec<_> =
                 twin.fields.iter().map(|(name, offset)| ((*name).to_owned(), *offset)).collect();
             assert_eq!(fields, expected, "{name} in {file}");
@@ -166,7 +166,7 @@ fn structs_lie_alike_on_both_sides() {
             seen.insert(twin.name);
         }
     }
-    let unseen: Vec<_> = twins().iter().map(|twin| twin.name).filter(|name| !seen.contains(name)).collect();
+    let unseen: Vec<_> = twins().map(|twin| twin.name).filter(|name| !seen.contains(name)).collect();
     assert!(unseen.is_empty(), "no shader uses {unseen:?}");
 }
 
@@ -191,11 +191,17 @@ fn constants(text: &str, beginning: &str, separator: &str) -> BTreeMap<String, u
 
 #[test]
 fn constants_are_the_same_on_both_sides() {
-    let host_text =
-        std::fs::read_to_string(repository().join("renderer/src/gpu_types.rs")).expect("the host twins");
-    let host = constants(&host_text, "pub const ", ": u32 =");
+    let mut host = BTreeMap::new();
+    for file in ["scene", "frame", "accel"] {
+        let path = repository().join(format!("renderer/src/gpu_types/{file}.rs"));
+        host.extend(constants(
+            &std::fs::read_to_string(path).expect("the host twins"),
+            "pub const ",
+            ": u32 =",
+        ));
+    }
     let mut device = BTreeMap::new();
-    for file in ["scene", "frame", "rays", "textures", "needs"] {
+    for file in ["scene", "frame", "rays", "textures", "needs", "accel"] {
         device.extend(constants(&shader_text(&format!("shared/{file}.glsl")), "const uint ", "="));
     }
     assert!(device.len() > 30, "only {} constants were found", device.len());

@@ -37,21 +37,22 @@ impl Materials {
         self.by_id.get(&id).map(|(_, material)| material)
     }
 
-    /// Sets a material; true when whether rays may pass through it, or how its faces are culled, has changed.
-    pub(crate) fn set(&mut self, id: MaterialId, material: &delta::Material, textures: &Textures) -> bool {
+    /// Sets a material; says what follows for the instances that have it.
+    pub(crate) fn set(
+        &mut self,
+        id: MaterialId,
+        material: &delta::Material,
+        textures: &Textures,
+    ) -> MaterialChange {
         let old = self.by_id.get(&id);
-        let flipped = old.is_some_and(|(_, old)| {
-            is_opaque(old) != is_opaque(material)
-                || shows_both_sides(old) != shows_both_sides(material)
-                || has_alpha(old) != has_alpha(material)
-        });
+        let change = old.map_or(MaterialChange::Values, |(_, old)| change_between(old, material));
         let index = match old {
             Some((index, _)) => *index,
             None => self.free.pop().unwrap_or(self.table.len() as u32),
         };
         self.table.set(index as usize, pack(material, textures));
         self.by_id.insert(id, (index, material.clone()));
-        flipped
+        change
     }
 
     pub(crate) fn remove(&mut self, id: MaterialId) {
@@ -70,6 +71,29 @@ impl Materials {
 
     pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
         self.table.flush(recorder)
+    }
+}
+
+/// What a new version of a material means for the instances that have it, from little to much.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum MaterialChange {
+    /// The table alone.
+    Values,
+    /// Its emitters shine differently.
+    Emission,
+    /// Rays pass where they did not, faces are culled differently, or it began or ended to shine: the instances belong
+    /// elsewhere.
+    Kind,
+}
+
+fn change_between(old: &delta::Material, new: &delta::Material) -> MaterialChange {
+    let kind = |m: &delta::Material| (is_opaque(m), shows_both_sides(m), has_alpha(m), emits(m));
+    if kind(old) != kind(new) {
+        MaterialChange::Kind
+    } else if old.emissive != new.emissive {
+        MaterialChange::Emission
+    } else {
+        MaterialChange::Values
     }
 }
 

@@ -41,6 +41,12 @@ impl<T: Pod> Table<T> {
         self.host = values;
     }
 
+    /// Forgets every entry; the memory on the device stays.
+    pub(crate) fn clear(&mut self) {
+        self.host.clear();
+        self.dirty.clear();
+    }
+
     pub(crate) fn get(&self, index: usize) -> Option<&T> {
         self.host.get(index)
     }

@@ -19,7 +19,10 @@ mod view;
 pub use accumulation::{Accumulation, BLOCK_SAMPLES, Sample};
 pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
-pub use measure::{AccelStatistics, LeftOut, Statistics, TlasWork};
+pub use measure::{
+    AccelBench, AccelStatistics, BlasTimes, DeviceProfile, LeftOut, ProfileInForce, Statistics, TlasTimes,
+    TlasWork,
+};
 pub use needs::{Needs, SceneSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
 pub use settings::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};

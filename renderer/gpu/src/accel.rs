@@ -225,6 +225,21 @@ pub(crate) fn record_builds(device: &Device, command: vk::CommandBuffer, builds:
     unsafe { device.accel_fns.cmd_build_acceleration_structures(command, &infos, &range_slices) };
 }
 
+/// Records the copy of a BLAS into one of its compacted size. The caller has placed barriers.
+pub(crate) fn record_compaction(
+    device: &Device,
+    command: vk::CommandBuffer,
+    from: &AccelStructure,
+    to: &AccelStructure,
+) {
+    let info = vk::CopyAccelerationStructureInfoKHR::default()
+        .src(from.raw)
+        .dst(to.raw)
+        .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
+    // SAFETY: both live until the work has finished; `to` has the size that the device named for `from`.
+    unsafe { device.accel_fns.cmd_copy_acceleration_structure(command, &info) };
+}
+
 /// Packs one instance descriptor (VkAccelerationStructureInstanceKHR). `transform`: three rows of a 3x4 matrix.
 pub fn pack_instance(
     transform: [[f32; 4]; 3],

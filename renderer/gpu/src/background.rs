@@ -9,7 +9,7 @@ use std::time::Instant;
 use ash::vk;
 
 use crate::Result;
-use crate::accel::{AccelBuild, AccelStructure, record_builds};
+use crate::accel::{AccelBuild, AccelStructure, record_builds, record_compaction};
 use crate::buffer::Buffer;
 use crate::context::Device;
 use crate::error::{Context, GpuError};
@@ -234,12 +234,7 @@ fn record(device: &Arc<Device>, slot: &mut Slot, work: &[BackgroundWork<'_>]) ->
     }
     for piece in work {
         if let BackgroundWork::Compact { from, to } = piece {
-            let info = vk::CopyAccelerationStructureInfoKHR::default()
-                .src(from.raw)
-                .dst(to.raw)
-                .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
-            // SAFETY: both are alive until this submission has finished; `to` has the size that the device named.
-            unsafe { device.accel_fns.cmd_copy_acceleration_structure(command, &info) };
+            record_compaction(device, command, from, to);
         }
     }
     // SAFETY: recording was begun above.

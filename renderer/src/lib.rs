@@ -16,6 +16,7 @@ pub mod shader;
 mod tables;
 mod view;
 
+pub use accel::AccelPolicy;
 pub use accumulation::{Accumulation, BLOCK_SAMPLES, Sample};
 pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};

@@ -17,7 +17,7 @@ use crate::delta::MeshId;
 use crate::error::Result;
 use crate::measure::AccelStatistics;
 use crate::passes::InstanceDescriptors;
-use crate::tables::{Changed, Tables};
+use crate::tables::{Changed, Download, Tables};
 
 use background::{Adopted, Later};
 use blas::{BlasKey, BlasTable, Built, Form};
@@ -255,6 +255,36 @@ impl Accel {
             Use::Group(self.groups.tlas, Stage::RayTracing, Access::AccelTrace),
             Use::Group(self.groups.blas, Stage::RayTracing, Access::AccelTrace),
         ]
+    }
+
+    /// The use of a copy of the descriptors back to the host.
+    pub(crate) fn download_uses(&self) -> [Use<'static>; 1] {
+        [Use::Group(self.groups.descriptors, Stage::Transfer, Access::TransferRead)]
+    }
+
+    /// Records the copy of the descriptors back to the host.
+    pub(crate) fn download_descriptors(&self, recorder: &mut Recorder) -> Result<Download> {
+        match self.tlas.descriptors() {
+            Some(buffer) => Download::of(recorder, buffer),
+            None => Ok(Download::default()),
+        }
+    }
+
+    /// Where the descriptor of a slot stands.
+    pub(crate) fn place_of(&self, slot: u32) -> u32 {
+        self.tlas.place_of(slot)
+    }
+
+    /// Key of the BLAS at a device address, in words.
+    pub(crate) fn key_at(&self, address: u64) -> Option<String> {
+        let at =
+            |blas: &blas::Blas| blas.built.as_ref().is_some_and(|built| built.structure.address() == address);
+        self.blases.iter().find(|(_, blas)| at(blas)).map(|(_, blas)| format!("{:?}", blas.key))
+    }
+
+    /// Keys of all BLASes, in words.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = String> {
+        self.blases.iter().map(|(_, blas)| format!("{:?}", blas.key))
     }
 
     pub(crate) fn statistics(&self) -> &AccelStatistics {

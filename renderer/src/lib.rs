@@ -7,6 +7,7 @@ pub mod delta;
 mod error;
 mod frame;
 pub mod gpu_types;
+mod inventory;
 mod measure;
 mod needs;
 mod passes;
@@ -20,6 +21,7 @@ pub use accel::AccelPolicy;
 pub use accumulation::{Accumulation, BLOCK_SAMPLES, Sample};
 pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
+pub use inventory::{InstanceEntry, Inventory};
 pub use measure::{
     AccelBench, AccelStatistics, BlasTimes, DeviceProfile, LeftOut, ProfileInForce, Statistics, TlasTimes,
     TlasWork,

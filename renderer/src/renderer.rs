@@ -13,6 +13,7 @@ use crate::delta::{InstanceId, Invalidation, MaterialId, SceneDelta};
 use crate::error::{RendererError, Result};
 use crate::frame;
 use crate::gpu_types::AccumulatorPixel;
+use crate::inventory::{self, Inventory};
 use crate::measure::Statistics;
 use crate::needs::{Needs, SceneSummary};
 use crate::passes::{Builder, PassSet, ScenePasses};
@@ -139,6 +140,14 @@ impl Renderer {
     /// Whether acceleration structures are left to be built or to be made better in later frames.
     pub fn is_busy(&self) -> bool {
         self.accel.is_busy()
+    }
+
+    /// What is on the device, by id. Waits for the device.
+    ///
+    /// # Errors
+    /// When tables contradict each other, or the device fails.
+    pub fn inventory(&self, frames: &mut Frames) -> Result<Inventory> {
+        inventory::take(&self.tables, &self.accel, frames)
     }
 
     /// Makes a view. `window`: its image is encoded for a window and carries the outline of the selection.

@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 use caustica_gpu::{Access, Device, Recorder, ResourceId, Stage, Use};
 
-pub(crate) use draws::{Batch, BatchKey};
+pub(crate) use draws::Batch;
 pub(crate) use instances::{Instances, Slot};
 pub(crate) use materials::{
     MaterialChange, Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits,
@@ -28,7 +28,7 @@ pub(crate) use materials::{
 pub(crate) use meshes::{Meshes, rows_of};
 pub(crate) use snapshot::Snapshot;
 pub(crate) use spatial_order::order_of;
-pub(crate) use table::Table;
+pub(crate) use table::{Download, Table};
 
 use crate::delta::{InstanceId, MaterialId, MeshId, SceneDelta};
 use crate::error::Result;
@@ -56,17 +56,6 @@ pub(crate) struct Changed {
     pub(crate) reshaped: BTreeSet<MeshId>,
     /// Instances whose vertices were evaluated anew.
     pub(crate) deformed: Vec<InstanceId>,
-}
-
-impl Changed {
-    pub(crate) fn is_empty(&self) -> bool {
-        !self.all
-            && self.slots.is_empty()
-            && self.moved.is_empty()
-            && self.meshes.is_empty()
-            && self.reshaped.is_empty()
-            && self.deformed.is_empty()
-    }
 }
 
 /// The scene on the device.
@@ -271,6 +260,11 @@ impl Tables {
             Use::Group(self.group, stage, Access::StorageRead),
             Use::Group(self.geometry_group, stage, Access::StorageRead),
         ]
+    }
+
+    /// The uses of a copy of the tables back to the host.
+    pub(crate) fn download_uses(&self) -> [Use<'static>; 2] {
+        [self.group, self.geometry_group].map(|id| Use::Group(id, Stage::Transfer, Access::TransferRead))
     }
 
     /// The use of the vertices as input of acceleration structure builds.

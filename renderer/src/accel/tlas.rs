@@ -266,9 +266,14 @@ impl Tlas {
         }
     }
 
-    /// The record of a slot, for comparisons.
-    pub(crate) fn record(&self, slot: u32) -> Option<&TlasSlot> {
-        self.records.get(slot as usize)
+    /// Where the descriptor of a slot stands.
+    pub(crate) fn place_of(&self, slot: u32) -> u32 {
+        self.places.of(slot)
+    }
+
+    /// The descriptors on the device.
+    pub(crate) fn descriptors(&self) -> Option<&Buffer> {
+        self.descriptors.as_ref()
     }
 }
 

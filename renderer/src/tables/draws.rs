@@ -9,7 +9,7 @@ use caustica_gpu::{CullMode, Device, Recorder};
 use super::instances::{Instances, Slot};
 use super::materials::{Materials, has_alpha, shows_both_sides};
 use super::meshes::Meshes;
-use super::table::Table;
+use super::table::{Download, Table};
 use crate::delta::MeshId;
 use crate::error::Result;
 
@@ -184,13 +184,13 @@ impl Draws {
         })
     }
 
-    /// The slots of every batch, sorted, for comparisons.
-    pub(crate) fn contents(&self) -> impl Iterator<Item = (BatchKey, &[u32])> {
-        self.by_key.iter().map(|(key, number)| (*key, self.lists[*number as usize].slots.as_slice()))
-    }
-
     pub(crate) fn address(&self) -> u64 {
         self.table.address()
+    }
+
+    /// Records the copy of the table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.table.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {

@@ -11,7 +11,7 @@ use super::alias;
 use super::instances::{Instances, Slot};
 use super::materials::{Materials, emits};
 use super::meshes::Meshes;
-use super::table::Table;
+use super::table::{Download, Table};
 use crate::error::Result;
 use crate::gpu_types::{AliasEntry, EmissiveTriangle};
 
@@ -95,6 +95,11 @@ impl Emissive {
 
     pub(crate) fn alias_address(&self) -> u64 {
         self.alias.address()
+    }
+
+    /// Records the copies of triangles and alias table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<(Download, Download)> {
+        Ok((self.triangles.download(recorder)?, self.alias.download(recorder)?))
     }
 
     pub(crate) fn is_dirty(&self) -> bool {

@@ -8,7 +8,7 @@ use glam::{Affine3A, Mat3A, Vec3A};
 
 use super::materials::Materials;
 use super::meshes::{Meshes, rows_of};
-use super::table::Table;
+use super::table::{Download, Table};
 use crate::delta::{Instance, InstanceId, MaterialId, Visibility};
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{self, INSTANCE_MIRRORED, Rows};
@@ -248,6 +248,16 @@ impl Instances {
 
     pub(crate) fn material_slots_address(&self) -> u64 {
         self.material_slots.address()
+    }
+
+    /// Records the copy of the table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.table.download(recorder)
+    }
+
+    /// Records the copy of the material slots back to the host.
+    pub(crate) fn download_material_slots(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.material_slots.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {

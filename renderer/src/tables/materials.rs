@@ -6,7 +6,7 @@ use std::sync::Arc;
 use caustica_gpu::{Device, Recorder};
 use glam::Vec3;
 
-use super::table::Table;
+use super::table::{Download, Table};
 use super::textures::Textures;
 use crate::delta::{self, AlphaMode, MaterialId, ShadingMode};
 use crate::error::{RendererError, Result};
@@ -61,8 +61,23 @@ impl Materials {
         }
     }
 
+    /// Every material with its index.
+    pub(crate) fn ids(&self) -> impl Iterator<Item = (MaterialId, u32)> {
+        self.by_id.iter().map(|(id, (index, _))| (*id, *index))
+    }
+
+    /// The material at an index.
+    pub(crate) fn id_of(&self, index: u32) -> Option<MaterialId> {
+        self.ids().find(|(_, other)| *other == index).map(|(id, _)| id)
+    }
+
     pub(crate) fn address(&self) -> u64 {
         self.table.address()
+    }
+
+    /// Records the copy of the table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.table.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {

@@ -96,6 +96,11 @@ impl Meshes {
         self.by_id.get(&id).ok_or_else(|| RendererError::Unknown { what: "mesh", id: id.0.to_string() })
     }
 
+    /// All meshes in order of id.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (MeshId, &GpuMesh)> {
+        self.by_id.iter().map(|(id, mesh)| (*id, mesh))
+    }
+
     /// Uploads a mesh, or its new content. True: it took another's place.
     pub(crate) fn set(&mut self, recorder: &mut Recorder, id: MeshId, mesh: &Arc<Mesh>) -> Result<bool> {
         check(mesh, &self.device)?;

@@ -193,8 +193,7 @@ impl Accel {
         else {
             return false;
         };
-        let deformed = blas.key.deforming.and_then(|id| tables.deforming.growth(id)).unwrap_or(1.0);
-        deformed * stretch(&built.boxes, &boxes_of(tables, blas.key.mesh)) > SURFACE_LIMIT
+        stretch(&built.boxes, &boxes_of(tables, blas.key.mesh)) > SURFACE_LIMIT
     }
 
     fn build(

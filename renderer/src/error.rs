@@ -42,6 +42,14 @@ pub enum RendererError {
         /// How many are allowed.
         limit: u64,
     },
+    /// How a mesh deforms, or the pose of one of its instances, does not fit.
+    #[error("mesh '{mesh}' cannot be posed: {reason}")]
+    Deformation {
+        /// Name of the mesh.
+        mesh: String,
+        /// What does not fit.
+        reason: String,
+    },
     /// An id that is not in the tables.
     #[error("{what} {id} is not in the scene")]
     Unknown {

@@ -2,6 +2,7 @@
 //! This file holds what they share: how pipelines are built, and what a pass may touch.
 
 mod accumulate;
+mod deform;
 mod gbuffer;
 mod instance_descriptors;
 mod post;
@@ -18,6 +19,7 @@ use caustica_gpu::{
 };
 
 pub(crate) use accumulate::Accumulate;
+pub(crate) use deform::Deform;
 pub(crate) use gbuffer::GBuffer;
 pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
 pub(crate) use post::Post;
@@ -92,8 +94,8 @@ impl Builder<'_> {
     }
 }
 
-/// A compute pipeline that reads tables by address alone, without set 0 and without needs.
-fn scene_compute(
+/// Builds a pass that works on tables alone: no scene set, no needs.
+fn table_pass(
     device: &Arc<Device>,
     library: &mut ShaderLibrary,
     label: &str,
@@ -102,6 +104,13 @@ fn scene_compute(
     let stage = library.stage(file)?;
     let general = Specialization::default();
     Ok(ComputePipeline::new(device, label, &stage.module, &stage.interface, &general, None)?)
+}
+
+/// Groups of 64 that go through `count` entries of a table; the shader takes several steps where they are too few.
+fn table_groups(count: u32) -> [u32; 3] {
+    /// What every device allows (Vulkan 1.3, maxComputeWorkGroupCount).
+    const MOST_GROUPS: u32 = 65535;
+    [count.div_ceil(64).min(MOST_GROUPS), 1, 1]
 }
 
 /// What the passes of one frame may touch.
@@ -165,12 +174,16 @@ impl Scope<'_> {
 
 /// The passes that bring the scene itself up to date, whatever the views show.
 pub(crate) struct ScenePasses {
+    pub(crate) deform: Deform,
     pub(crate) instance_descriptors: InstanceDescriptors,
 }
 
 impl ScenePasses {
     pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
-        Ok(Self { instance_descriptors: InstanceDescriptors::new(device, library)? })
+        Ok(Self {
+            deform: Deform::new(device, library)?,
+            instance_descriptors: InstanceDescriptors::new(device, library)?,
+        })
     }
 }
 

@@ -113,9 +113,12 @@ impl Renderer {
             let reason = if delta.reason.is_empty() { "scene" } else { &delta.reason };
             self.invalidate(what, reason);
         }
-        self.tables.flush(recorder)?;
         let slot = recorder.slot();
-        let changed = std::mem::take(&mut self.changed);
+        let mut changed = std::mem::take(&mut self.changed);
+        if let Err(error) = self.tables.flush(recorder, &self.scene_passes.deform, &mut changed) {
+            self.changed = Changed { all: true, ..changed };
+            return Err(error);
+        }
         match self.accel.update(recorder, &self.tables, &changed, &self.scene_passes.instance_descriptors) {
             Ok(true) => self.invalidate(Invalidation::Scene, "built what was pending"),
             Ok(false) => {}

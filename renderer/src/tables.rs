@@ -2,6 +2,8 @@
 //! and what the acceleration structures and `needs` want to know. Only what changed is uploaded.
 
 pub(crate) mod alias;
+mod apply;
+mod deformation;
 mod deforming;
 mod draws;
 mod emissive;
@@ -22,17 +24,16 @@ use caustica_gpu::{Access, Device, Recorder, ResourceId, Stage, Use};
 
 pub(crate) use draws::Batch;
 pub(crate) use instances::{Instances, Slot};
-pub(crate) use materials::{
-    MaterialChange, Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits,
-};
+pub(crate) use materials::{Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits};
 pub(crate) use meshes::{Meshes, rows_of};
 pub(crate) use snapshot::Snapshot;
 pub(crate) use spatial_order::order_of;
 pub(crate) use table::{Download, Table};
 
-use crate::delta::{InstanceId, MaterialId, MeshId, SceneDelta};
+use crate::delta::{InstanceId, MeshId};
 use crate::error::Result;
 use crate::gpu_types;
+use crate::passes::Deform;
 
 use deforming::Deforming;
 use draws::Draws;
@@ -86,139 +87,30 @@ impl Tables {
             emissive: Emissive::new(device),
             environment: EnvironmentTable::new(device, recorder)?,
             draws: Draws::new(device),
-            deforming: Deforming,
+            deforming: Deforming::new(device),
             scene: Table::new(device, "scene"),
             group: device.new_resource_id(),
             geometry_group: device.new_resource_id(),
         })
     }
 
-    /// Takes a delta in and adds to `changed`; the caller uploads with [`Self::flush`] in the same frame.
-    ///
-    /// # Errors
-    /// When the delta names what is not there, or memory runs out.
-    pub(crate) fn apply(
-        &mut self,
-        recorder: &mut Recorder,
-        delta: &SceneDelta,
-        changed: &mut Changed,
-    ) -> Result<()> {
-        self.apply_assets(recorder, delta, changed)?;
-        for id in &delta.removed_instances {
-            changed.slots.extend(self.instances.remove(*id));
-        }
-        for (id, instance) in &delta.instances {
-            changed.slots.insert(self.instances.set(*id, instance, &self.meshes, &self.materials)?);
-        }
-        let mut redrawn = changed.slots.clone();
-        for (id, transform) in &delta.transforms {
-            let (slot, turned) = self.instances.set_transform(*id, *transform)?;
-            changed.moved.push(slot);
-            self.emissive.follow_transform(slot, &self.instances);
-            if turned {
-                redrawn.insert(slot);
-            }
-        }
-        for (id, visibility) in &delta.visibility {
-            let slot = self.instances.set_visibility(*id, *visibility)?;
-            changed.slots.insert(slot);
-            redrawn.insert(slot);
-        }
-        for id in &delta.removed_meshes {
-            self.meshes.remove(*id);
-        }
-        self.lights.apply(delta);
-        if let Some(environment) = &delta.environment {
-            self.environment.set(recorder, environment)?;
-        }
-        for slot in redrawn {
-            self.draws.follow(slot, &self.instances, &self.materials, &self.meshes);
-            self.emissive.follow(slot, &self.instances, &self.materials);
-        }
-        if !delta.removed_instances.is_empty() {
-            self.instances.tidy();
-            self.draws.tidy();
-        }
-        self.emissive.update(&self.instances, &self.materials, &self.meshes);
-        Ok(())
-    }
-
-    fn apply_assets(
-        &mut self,
-        recorder: &mut Recorder,
-        delta: &SceneDelta,
-        changed: &mut Changed,
-    ) -> Result<()> {
-        if !delta.meshes.is_empty() || !delta.textures.is_empty() {
-            recorder.declare(&[Use::Group(self.geometry_group, Stage::Transfer, Access::TransferWrite)]);
-        }
-        // Instances that must be looked at though the delta does not name them: of meshes that were replaced or
-        // turned over, of materials that became another kind.
-        let mut other_meshes: BTreeSet<MeshId> = BTreeSet::new();
-        let mut other_materials: BTreeSet<MaterialId> = BTreeSet::new();
-        for (id, mesh) in &delta.meshes {
-            if self.meshes.set(recorder, *id, mesh)? {
-                other_meshes.insert(*id);
-            }
-            changed.meshes.insert(*id);
-        }
-        for (id, geometry, map) in &delta.primitive_transforms {
-            if self.meshes.set_primitive(*id, *geometry, map)? {
-                other_meshes.insert(*id);
-            }
-            changed.reshaped.insert(*id);
-            if self.emissive.places(*id, &self.instances) {
-                self.emissive.mark_stale();
-            }
-        }
-        for (id, texture) in &delta.textures {
-            self.textures.set(recorder, *id, texture)?;
-        }
-        for id in &delta.removed_textures {
-            self.textures.remove(*id);
-        }
-        for (id, material) in &delta.materials {
-            match self.materials.set(*id, material, &self.textures) {
-                MaterialChange::Values => {}
-                MaterialChange::Emission => self.emissive.mark_stale(),
-                MaterialChange::Kind => {
-                    other_materials.insert(*id);
-                }
-            }
-        }
-        for id in &delta.removed_materials {
-            self.materials.remove(*id);
-        }
-        if !other_meshes.is_empty() || !other_materials.is_empty() {
-            let named = |entry: &Slot| {
-                other_meshes.contains(&entry.instance.mesh)
-                    || entry.instance.materials.iter().any(|id| other_materials.contains(id))
-            };
-            let found: Vec<(u32, MeshId)> = self
-                .instances
-                .iter()
-                .filter(|(_, entry)| named(entry))
-                .map(|(slot, entry)| (slot, entry.instance.mesh))
-                .collect();
-            for (slot, mesh) in found {
-                self.instances.set_geometries(slot, self.meshes.get(mesh)?.geometries_address());
-                changed.slots.insert(slot);
-            }
-        }
-        Ok(())
-    }
-
     /// A frame has gone by: what moved in it has its present place as its previous one.
     pub(crate) fn settle(&mut self) {
         self.instances.settle();
         self.meshes.settle();
+        self.deforming.settle();
     }
 
-    /// Uploads every changed entry.
+    /// Uploads every changed entry and evaluates every new pose; adds the instances that changed shape to `changed`.
     ///
     /// # Errors
     /// When memory runs out.
-    pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
+    pub(crate) fn flush(
+        &mut self,
+        recorder: &mut Recorder,
+        deform: &Deform,
+        changed: &mut Changed,
+    ) -> Result<()> {
         let waits = [
             self.instances.is_dirty(),
             self.materials.is_dirty(),
@@ -246,6 +138,7 @@ impl Tables {
             self.scene.set(0, record);
             self.scene.flush(recorder)?;
         }
+        changed.deformed.extend(self.deforming.record(recorder, deform, self.geometry_group)?);
         Ok(())
     }
 
@@ -277,10 +170,15 @@ impl Tables {
         &self,
         recorder: &mut Recorder,
         mesh: MeshId,
-        _deforming: Option<InstanceId>,
+        deforming: Option<InstanceId>,
     ) -> Result<Snapshot> {
         let mesh = self.meshes.get(mesh)?;
-        Snapshot::new(recorder, &mesh.vertices, &mesh.geometries, None, self.geometry_group)
+        let posed = deforming.and_then(|id| self.deforming.get(id));
+        let (records, positions) = match posed {
+            Some(posed) => (&posed.geometries, Some(&posed.positions)),
+            None => (&mesh.geometries, None),
+        };
+        Snapshot::new(recorder, &mesh.vertices, records, positions, self.geometry_group)
     }
 
     fn record(&self) -> gpu_types::Scene {

@@ -1,4 +1,5 @@
-// What every ray-tracing stage agrees on: the TLAS, payloads, ray kinds. Host twin: renderer/src/gpu_types.rs (HIT_GROUP_*).
+// What every ray-tracing stage agrees on: the TLAS, payloads, ray kinds. Host twins of the
+// constants: renderer/src/gpu_types/constants.rs.
 #ifndef SHARED_RAYS
 #define SHARED_RAYS
 

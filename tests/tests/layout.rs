@@ -155,7 +155,7 @@ fn structs_lie_alike_on_both_sides() {
         reflect(&file, &words).expect("its interface fits the host");
         let module = Module::parse(&words);
         for (id, name, fields) in module.structs() {
-            let Some(twin) = twins().find(|twin| twin.name == name) else { continue };
+            let Some(twin) = twins().iter().find(|twin| twin.name == name) else { continue };
             let expected: Vec<_> =
                 twin.fields.iter().map(|(name, offset)| ((*name).to_owned(), *offset)).collect();
             assert_eq!(fields, expected, "{name} in {file}");
@@ -166,8 +166,17 @@ fn structs_lie_alike_on_both_sides() {
             seen.insert(twin.name);
         }
     }
-    let unseen: Vec<_> = twins().map(|twin| twin.name).filter(|name| !seen.contains(name)).collect();
+    let unseen: Vec<_> = twins().iter().map(|twin| twin.name).filter(|name| !seen.contains(name)).collect();
     assert!(unseen.is_empty(), "no shader uses {unseen:?}");
+}
+
+/// Every file of `shaders/shared`.
+fn shared_files() -> Vec<String> {
+    let folder = std::fs::read_dir(shader_folder().join("shared")).expect("the shared shaders");
+    let mut found: Vec<String> =
+        folder.flatten().map(|file| format!("shared/{}", file.file_name().to_string_lossy())).collect();
+    found.sort();
+    found
 }
 
 /// `NAME = VALUE` of every `u32` constant in a text.
@@ -191,20 +200,17 @@ fn constants(text: &str, beginning: &str, separator: &str) -> BTreeMap<String, u
 
 #[test]
 fn constants_are_the_same_on_both_sides() {
-    let mut host = BTreeMap::new();
-    for file in ["scene", "frame", "accel"] {
-        let path = repository().join(format!("renderer/src/gpu_types/{file}.rs"));
-        host.extend(constants(
-            &std::fs::read_to_string(path).expect("the host twins"),
-            "pub const ",
-            ": u32 =",
-        ));
-    }
+    let host_file = repository().join("renderer/src/gpu_types/constants.rs");
+    let host_text = std::fs::read_to_string(host_file).expect("the host twins");
+    let host = constants(&host_text, "pub const ", ": u32 =");
     let mut device = BTreeMap::new();
-    for file in ["scene", "frame", "rays", "textures", "needs", "accel"] {
-        device.extend(constants(&shader_text(&format!("shared/{file}.glsl")), "const uint ", "="));
+    for file in shared_files() {
+        device.extend(constants(&shader_text(&file), "const uint ", "="));
     }
     assert!(device.len() > 30, "only {} constants were found", device.len());
+    for beginning in ["MASK_", "GEOMETRY_", "TLAS_", "RAY_", "SHOW_"] {
+        assert!(device.keys().any(|name| name.starts_with(beginning)), "no {beginning}* was found");
+    }
     for (name, value) in &device {
         assert_eq!(host.get(name), Some(value), "{name} of shaders/shared on the host");
     }

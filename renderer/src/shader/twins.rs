@@ -28,7 +28,7 @@ pub(super) fn check(words: &[u32]) -> Result<(), String> {
     for (id, name) in &structs.names {
         // Struct types that lie in buffers have offsets; copies in variables have none and are of no concern.
         if structs.offsets.contains_key(&(*id, 0))
-            && let Some(twin) = twins().find(|twin| twin.name == name)
+            && let Some(twin) = twins().iter().find(|twin| twin.name == name)
         {
             compare(&structs, *id, twin)?;
         }

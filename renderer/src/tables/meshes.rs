@@ -3,16 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use caustica_gpu::{Buffer, BufferUse, Device, Location, MemoryUse, Recorder};
+use caustica_gpu::{Buffer, BufferUse, Device, Location, MemoryUse, Recorder, ResourceId};
 use glam::{Affine3A, Vec3};
 
+use super::deformation::DeformationBuffers;
 use super::spatial_order::sort_triangles;
 use crate::delta::{self, Mesh, MeshId};
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{self, GEOMETRY_MOVED, GEOMETRY_MOVING, Rows, VertexAttributes};
 
 /// Offset of `mesh_from_primitive` inside a geometry record; acceleration structure builds read it there.
-const TRANSFORM_OFFSET: u64 = std::mem::offset_of!(gpu_types::Geometry, mesh_from_primitive) as u64;
+pub(super) const TRANSFORM_OFFSET: u64 =
+    std::mem::offset_of!(gpu_types::Geometry, mesh_from_primitive) as u64;
 
 /// Vertices and indices; a build in the background holds them until it has finished.
 pub(crate) struct Vertices {
@@ -27,6 +29,8 @@ pub(crate) struct GpuMesh {
     /// Geometry records, as on the device.
     records: Vec<gpu_types::Geometry>,
     pub(crate) geometries: Buffer,
+    /// How it deforms; `None`: rigid.
+    pub(super) deformation: Option<Arc<DeformationBuffers>>,
     /// The content, for emissive triangles and statistics.
     pub(crate) host: Arc<Mesh>,
     /// Bounds of each primitive, primitive space.
@@ -39,6 +43,21 @@ impl GpuMesh {
     /// Address of the geometry records.
     pub(crate) fn geometries_address(&self) -> u64 {
         self.geometries.address()
+    }
+
+    /// Address of the positions: of a mesh that deforms, at rest.
+    pub(super) fn positions_address(&self) -> u64 {
+        self.vertices.positions.address()
+    }
+
+    /// Address of the vertex attributes: of a mesh that deforms, at rest.
+    pub(super) fn attributes_address(&self) -> u64 {
+        self.vertices.attributes.address()
+    }
+
+    /// A number that no other content of this or another mesh has had.
+    pub(super) fn content(&self) -> ResourceId {
+        self.vertices.positions.id()
     }
 
     /// Number of primitives.
@@ -104,6 +123,7 @@ impl Meshes {
     /// Uploads a mesh, or its new content. True: it took another's place.
     pub(crate) fn set(&mut self, recorder: &mut Recorder, id: MeshId, mesh: &Arc<Mesh>) -> Result<bool> {
         check(mesh, &self.device)?;
+        let deformation = DeformationBuffers::new(&self.device, recorder, mesh)?.map(Arc::new);
         let mesh = Arc::new(in_spatial_order(mesh));
         let make = |what: &str, size: usize| {
             let name = format!("{} {what}", mesh.name);
@@ -124,7 +144,7 @@ impl Meshes {
         self.dirty.extend((0..records.len() as u32).map(|geometry| (id, geometry)));
         let bounds: Vec<_> = mesh.geometries.iter().map(|geometry| bounds_of(&mesh, geometry)).collect();
         let centre = centre_of(&mesh, &bounds);
-        let new = GpuMesh { vertices, records, geometries, host: mesh, bounds, centre };
+        let new = GpuMesh { vertices, records, geometries, deformation, host: mesh, bounds, centre };
         self.triangle_count += new.triangle_count();
         let old = self.by_id.insert(id, new);
         self.triangle_count -= old.as_ref().map_or(0, GpuMesh::triangle_count);
@@ -265,7 +285,8 @@ fn centre_of(mesh: &Mesh, bounds: &[(Vec3, Vec3)]) -> Vec3 {
 
 /// The mesh with the triangles of each geometry in spatial order.
 fn in_spatial_order(mesh: &Mesh) -> Mesh {
-    let mut sorted = mesh.clone();
+    // What deforms is on the device alone.
+    let mut sorted = Mesh { deformation: None, ..mesh.clone() };
     for geometry in &mesh.geometries {
         let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
         sort_triangles(&mesh.positions, &mut sorted.indices[range]);

@@ -1,35 +1,35 @@
-// Pass instance_descriptors: one instance descriptor of the TLAS a listed slot. In: instance table, records, BLAS addresses. Out: descriptors.
-// A slot without a BLAS gets a null reference and the identity: a number that is not finite never reaches the builder.
+// Pass instance_descriptors: what the TLAS is built from. In: an InstanceDescriptorJob at frame_address. Out: one descriptor a slot that is dirty.
+// An instance without a BLAS gets the identity and no reference; so does one whose transform is not finite, which the host never asks for:
+// one NaN in a TLAS takes its neighbours with it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 
-#include "shared/accel.glsl"
-#include "shared/frame.glsl"
-
 layout(local_size_x = 64) in;
 
-bool is_finite_row(vec4 row) {
-    return !any(isnan(row)) && !any(isinf(row));
+#include "shared/frame.glsl"
+#include "shared/instance_descriptors.glsl"
+#include "lib/vector.glsl"
+
+InstanceDescriptor describe(InstanceDescriptorJob job, uint slot, TlasSlot entry) {
+    InstanceDescriptor descriptor;
+    descriptor.render_from_mesh = InstanceTable(job.instances).at[slot].render_from_mesh;
+    descriptor.index_mask = (slot & 0xffffffu) | entry.mask_flags << 24;
+    descriptor.offset_flags = entry.mask_flags >> 8 << 24;
+    descriptor.blas = entry.blas != TLAS_NO_BLAS ? AddressTable(job.blases).at[entry.blas] : 0ul;
+    vec4 rows[3] = descriptor.render_from_mesh;
+    if (descriptor.blas == 0ul || !(is_finite(rows[0]) && is_finite(rows[1]) && is_finite(rows[2]))) {
+        descriptor.render_from_mesh = vec4[3](vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
+        descriptor.blas = 0ul;
+    }
+    return descriptor;
 }
 
 void main() {
-    DescriptorJob job = DescriptorJobTable(push.frame_address).job;
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= job.count) {
-        return;
+    InstanceDescriptorJob job = DescriptorJobTable(push.frame_address).job;
+    uint step = gl_NumWorkGroups.x * gl_WorkGroupSize.x;
+    for (uint i = gl_GlobalInvocationID.x; i < job.count; i += step) {
+        uint slot = job.dirty != 0ul ? UintTable(job.dirty).at[i] : i;
+        TlasSlot entry = TlasSlotTable(job.slots).at[slot];
+        DescriptorOutput(job.descriptors).at[entry.place] = describe(job, slot, entry);
     }
-    uint slot = job.listed != 0ul ? UintTable(job.listed).at[index] : index;
-    TlasSlot record = TlasSlotTable(job.slots).at[slot];
-    uint64_t blas = record.blas != TLAS_NO_BLAS ? AddressTable(job.blases).at[record.blas] : 0ul;
-    vec4 rows[3] = InstanceTable(job.instances).at[slot].render_from_mesh;
-    if (blas == 0ul || !is_finite_row(rows[0]) || !is_finite_row(rows[1]) || !is_finite_row(rows[2])) {
-        rows = vec4[3](vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
-        blas = 0ul;
-    }
-    InstanceDescriptor descriptor;
-    descriptor.transform = rows;
-    descriptor.index_mask = (slot & 0xffffffu) | (record.mask_flags & 0xffu) << 24;
-    descriptor.offset_flags = (record.mask_flags >> 8 & 0xffu) << 24;
-    descriptor.blas = blas;
-    DescriptorTable(job.descriptors).at[record.place] = descriptor;
 }

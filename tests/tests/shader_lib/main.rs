@@ -1,9 +1,12 @@
 //! The shader library against oracles in double precision: robustness, rows 1 and 3 to 13, each with the naive form
-//! beside it, which fails. Each snippet runs on the device through the renderer's own compiler.
+//! beside it, which fails. Each snippet runs on the device through the renderer's own compiler; passes that work on tables
+//! alone run whole.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
 mod accumulate;
 mod color;
+mod deform;
+mod descriptors;
 mod directions;
 mod environment;
 mod fresnel;
@@ -13,3 +16,4 @@ mod offsets;
 mod random;
 mod scatter;
 mod shapes;
+mod table_pass;

@@ -40,7 +40,7 @@ enum Command {
     Render(render::RenderArgs),
     /// Audit a project or model: structure and numbers; exit code 1 on errors
     Check(check::CheckArgs),
-    /// List the Vulkan devices, what each lacks, and which one is chosen
+    /// List the Vulkan devices, what each lacks, and which one is chosen; or measure one
     Devices(devices::DevicesArgs),
 }
 
@@ -91,7 +91,7 @@ pub fn run() -> ExitCode {
     let result = match cli.command {
         Some(Command::Render(args)) => logged(|| render::run(&args, &cli.device, cli.shaders.clone())),
         Some(Command::Check(args)) => logged(|| check::run(&args)),
-        Some(Command::Devices(args)) => logged(|| devices::run(&args)),
+        Some(Command::Devices(args)) => logged(|| devices::run(&args, &cli.device)),
         None => match cli.file.as_ref().filter(|file| !file.exists()) {
             Some(missing) => {
                 let missing = missing.display();

@@ -179,6 +179,9 @@ fn changes_structure(edit: &Edit) -> bool {
         | Edit::SetLight { .. }
         | Edit::SetCamera { .. }
         | Edit::SetEnvironment(_)
+        | Edit::SetMorphWeights { .. }
+        | Edit::SetClip { .. }
+        | Edit::SetRayVisibility { .. }
         | Edit::SetPrimitiveTransform { .. } => false,
         Edit::Batch { edits, .. } => edits.iter().any(changes_structure),
         _ => true,

@@ -75,7 +75,7 @@ impl Session {
     /// When memory runs out or the driver refuses.
     pub fn new(device: &Arc<Device>, options: SessionOptions) -> anyhow::Result<Self> {
         let mut frames = Frames::new(device)?;
-        let renderer_options = RendererOptions { shaders: options.shaders };
+        let renderer_options = RendererOptions { shaders: options.shaders, ..RendererOptions::default() };
         let mut renderer = Renderer::new(device, &mut frames, &renderer_options)?;
         let view = renderer.create_view(options.extent, options.settings, options.window)?;
         if options.window {

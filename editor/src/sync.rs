@@ -93,7 +93,7 @@ impl Sync {
             self.extents.remove(*target);
         }
         for target in changes.added.keys().chain(changes.transforms.keys()) {
-            match document.bounds_of(*target).filter(|_| document.mesh_of(*target).is_some()) {
+            match document.own_bounds(*target) {
                 Some((low, high)) => self.extents.set(*target, (high - low).length()),
                 None => self.extents.remove(*target),
             }
@@ -119,7 +119,14 @@ impl Sync {
         delta: &mut SceneDelta,
         touched: &mut Touched,
     ) {
-        for target in changes.added.keys().chain(changes.instances.keys()) {
+        let sent: BTreeSet<Target> = changes
+            .added
+            .keys()
+            .chain(changes.instances.keys())
+            .chain(changes.visibility.keys())
+            .copied()
+            .collect();
+        for target in &sent {
             match document.renderable(*target) {
                 Some(renderable) => {
                     let used = InUse { mesh: renderable.mesh, materials: renderable.materials.clone() };
@@ -182,7 +189,7 @@ impl Sync {
         for target in moved {
             if self.instances.contains_key(&target)
                 && !sent.contains(&instance_id(target))
-                && let Some(world) = document.world_from(target)
+                && let Some(world) = document.world_from_mesh(target)
             {
                 delta.transforms.push((instance_id(target), self.render_from(&world)));
             }
@@ -199,7 +206,8 @@ impl Sync {
         touched: &Touched,
         delta: &mut SceneDelta,
     ) {
-        let changed = changes.meshes.iter().chain(&changes.primitive_transforms);
+        let moved = changes.primitive_transforms.iter().map(|(mesh, _)| mesh);
+        let changed = changes.meshes.iter().chain(moved);
         let meshes: BTreeSet<_> = touched.new_meshes.iter().chain(changed).copied().collect();
         for id in meshes.into_iter().filter(|id| self.meshes.contains_key(id)) {
             if let Some(mesh) = document.mesh(id) {

@@ -1,47 +1,69 @@
-//! Acceleration structures: one BLAS a (mesh, opaque geometries), one TLAS. Enters: tables and what changed in them.
-//! Leaves: a TLAS that is right in this very frame. Builds nothing that did not change.
+//! Acceleration structures: one BLAS a (mesh, opaque geometries, deforming instance), one TLAS. Enters: tables and what
+//! changed in them. Leaves: a TLAS that is right in this very frame. Builds nothing that did not change.
 
+mod background;
 mod blas;
+mod build;
+mod order;
+mod policy;
 mod tlas;
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use caustica_gpu::{Access, Device, Recorder, ResourceId, SceneSet, Stage, Use};
+use caustica_gpu::{Access, BuildMode, Device, Recorder, SceneSet, Stage, Use};
+use glam::Vec3;
 
+use crate::delta::MeshId;
 use crate::error::Result;
 use crate::measure::AccelStatistics;
-use crate::tables::{Changed, Tables};
+use crate::passes::InstanceDescriptors;
+use crate::tables::{Changed, Download, Tables};
 
-use blas::{Blas, BlasKey};
-use tlas::Tlas;
+use background::{Adopted, Later};
+use blas::{BlasKey, BlasTable, Built, Form};
+use build::{Job, Scratch, job_of};
+pub use policy::AccelPolicy;
+use policy::{Change, SURFACE_LIMIT, change_of, stretch};
+use tlas::{Dirty, Tlas};
 
 /// All acceleration structures of the scene.
 pub(crate) struct Accel {
     device: Arc<Device>,
-    blas: BTreeMap<BlasKey, Blas>,
+    policy: AccelPolicy,
+    blases: BlasTable,
     tlas: Tlas,
-    /// Stands for all BLASes in the barrier tracker.
-    blas_group: ResourceId,
-    tlas_group: ResourceId,
-    scratch: blas::Scratch,
+    later: Later,
+    scratch: Scratch,
+    groups: tlas::Groups,
+    /// Updates so far.
+    frame: u64,
     statistics: AccelStatistics,
 }
 
 impl Accel {
-    pub(crate) fn new(device: &Arc<Device>) -> Self {
-        Self {
+    /// # Errors
+    /// When memory runs out.
+    pub(crate) fn new(device: &Arc<Device>, policy: AccelPolicy) -> Result<Self> {
+        let groups = tlas::Groups {
+            blas: device.new_resource_id(),
+            tlas: device.new_resource_id(),
+            descriptors: device.new_resource_id(),
+        };
+        Ok(Self {
             device: Arc::clone(device),
-            blas: BTreeMap::new(),
+            policy,
+            blases: BlasTable::new(device),
             tlas: Tlas::new(device),
-            blas_group: device.new_resource_id(),
-            tlas_group: device.new_resource_id(),
-            scratch: blas::Scratch::new(device),
+            later: Later::new(device)?,
+            scratch: Scratch::new(device),
+            groups,
+            frame: 0,
             statistics: AccelStatistics::default(),
-        }
+        })
     }
 
-    /// Builds, refits or leaves alone, as `changed` asks.
+    /// Builds, refits or leaves alone, as `changed` asks. True: something of which the build was left to the background
+    /// has appeared, so that the image is another though the scene is the same.
     ///
     /// # Errors
     /// When memory runs out.
@@ -50,46 +72,175 @@ impl Accel {
         recorder: &mut Recorder,
         tables: &Tables,
         changed: &Changed,
-    ) -> Result<()> {
+        pass: &InstanceDescriptors,
+    ) -> Result<bool> {
+        self.frame += 1;
         self.statistics.forget_frame();
-        if changed.structure {
-            self.update_blas(recorder, tables, changed)?;
+        let mut dirty = Dirty::default();
+        self.follow(tables, changed, &mut dirty);
+        let adopted = self.later.step(&mut self.blases, &self.policy)?;
+        let jobs = self.plan(tables, changed, &adopted)?;
+        dirty.bounds = !jobs.is_empty();
+        dirty.addresses = !adopted.swapped.is_empty();
+        self.build(recorder, tables, jobs, &mut dirty)?;
+        if adopted.appeared {
+            // An instance that waited for its BLAS becomes active: its record names a structure now.
+            dirty.slots = (0..tables.instances.slot_count()).collect();
         }
-        if changed.structure || !changed.moved.is_empty() || !self.tlas.exists() {
-            let refs = |key: &BlasKey| self.blas.get(key).map_or(0, Blas::address);
-            let groups = tlas::Groups { blas: self.blas_group, tlas: self.tlas_group };
-            let what = self.tlas.update(recorder, tables, changed, refs, &mut self.scratch, groups)?;
-            self.statistics.tlas = what;
+        if !dirty.is_empty() || !self.tlas.exists() {
+            let (policy, scratch, groups) = (&self.policy, &mut self.scratch, self.groups);
+            self.statistics.tlas =
+                self.tlas.update(recorder, tables, &mut self.blases, dirty, policy, pass, scratch, groups)?;
         }
-        self.statistics.add_up();
-        self.statistics.blas_count = self.blas.len() as u64;
-        self.statistics.instance_count = tables.instances.len() as u64;
-        if changed.structure {
-            self.statistics.triangle_count = tables.meshes.triangle_count();
-            self.statistics.blas_bytes = self.blas.values().map(Blas::size).sum();
+        self.later.prepare(recorder, tables, &self.blases, &self.policy, self.frame)?;
+        self.note(tables, &adopted);
+        Ok(adopted.appeared)
+    }
+
+    /// Gives every slot that changed the BLAS that it needs now.
+    fn follow(&mut self, tables: &Tables, changed: &Changed, dirty: &mut Dirty) {
+        let count = tables.instances.slot_count();
+        if changed.all {
+            dirty.slots = (0..count.max(self.blases.slot_count())).collect();
+        } else {
+            dirty.slots = changed.slots.iter().copied().collect();
+        }
+        for slot in &dirty.slots {
+            let key = tables.instances.get(*slot).map(|entry| BlasKey::of(entry, tables));
+            if self.blases.assign(*slot, key) {
+                dirty.reused += 1;
+            }
+        }
+        self.blases.tidy();
+        dirty.slots.retain(|slot| *slot < count);
+        for mesh in &changed.meshes {
+            for number in self.blases.of_mesh(*mesh) {
+                self.blases.forget_structure(number);
+                self.blases.mark_changed(number, self.frame);
+            }
+        }
+        if !changed.all {
+            // A slot may be named twice: an instance that was changed and moved.
+            let moved = changed.moved.iter().copied().filter(|slot| !changed.slots.contains(slot));
+            dirty.slots.extend(moved);
+        }
+    }
+
+    /// What is to be built or refitted in this frame.
+    fn plan(&mut self, tables: &Tables, changed: &Changed, adopted: &Adopted) -> Result<Vec<Job>> {
+        let mut jobs = Vec::new();
+        for mesh in &changed.reshaped {
+            for number in self.blases.of_mesh(*mesh) {
+                self.blases.mark_changed(number, self.frame);
+                jobs.extend(self.change(tables, number)?);
+            }
+        }
+        for id in &changed.deformed {
+            let Some(entry) = tables.instances.slot_of(*id).and_then(|slot| tables.instances.get(slot))
+            else {
+                continue;
+            };
+            let Some(number) = self.blases.of_deforming(entry.instance.mesh, *id) else { continue };
+            if jobs.iter().any(|job: &Job| job.number == number) {
+                continue;
+            }
+            self.blases.mark_changed(number, self.frame);
+            jobs.extend(self.change(tables, number)?);
+        }
+        for number in &adopted.to_refit {
+            if !jobs.iter().any(|job| job.number == *number) {
+                jobs.extend(self.change(tables, *number)?);
+            }
+        }
+        let missing: Vec<u32> = self.blases.unbuilt.iter().copied().collect();
+        let mut triangles = 0;
+        for number in missing {
+            let Some(blas) = self.blases.get(number) else { continue };
+            let deforms = blas.key.deforming.is_some();
+            let edited = changed.reshaped.contains(&blas.key.mesh);
+            let form = if deforms || edited { Form::Dynamic } else { Form::Static { compacted: false } };
+            let own = tables.meshes.get(blas.key.mesh)?.triangle_count();
+            if !deforms && !self.policy.fits_frame(triangles, own) {
+                self.blases.wait_for_background(number);
+                continue;
+            }
+            triangles += own;
+            let key = (number, &blas.key);
+            jobs.push(job_of(&self.device, tables, key, (form, BuildMode::Build), None, None)?);
+        }
+        Ok(jobs)
+    }
+
+    /// The job for a BLAS whose geometry has moved; none when it is still to be built at all.
+    fn change(&mut self, tables: &Tables, number: u32) -> Result<Option<Job>> {
+        let Some(blas) = self.blases.get(number) else { return Ok(None) };
+        let Some(built) = &blas.built else { return Ok(None) };
+        let (form, mode, into) = match change_of(&self.policy, built.form == Form::Dynamic) {
+            Change::MakeDynamic => (Form::Dynamic, BuildMode::Build, None),
+            Change::Refit => (Form::Dynamic, BuildMode::Refit, Some(&built.structure)),
+            Change::Rebuild => (Form::Dynamic, BuildMode::Build, Some(&built.structure)),
+        };
+        let job = job_of(&self.device, tables, (number, &blas.key), (form, mode), into, None)?;
+        if mode == BuildMode::Refit && self.is_loose(tables, number) {
+            self.blases.decayed.insert(number);
+        }
+        Ok(Some(job))
+    }
+
+    /// Whether refits have stretched the boxes of a BLAS too far.
+    fn is_loose(&self, tables: &Tables, number: u32) -> bool {
+        let Some((blas, built)) = self.blases.get(number).and_then(|blas| Some((blas, blas.built.as_ref()?)))
+        else {
+            return false;
+        };
+        stretch(&built.boxes, &boxes_of(tables, blas.key.mesh)) > SURFACE_LIMIT
+    }
+
+    fn build(
+        &mut self,
+        recorder: &mut Recorder,
+        tables: &Tables,
+        jobs: Vec<Job>,
+        dirty: &mut Dirty,
+    ) -> Result<()> {
+        if jobs.is_empty() {
+            return Ok(());
+        }
+        let (scratch, group) = (&mut self.scratch, self.groups.blas);
+        recorder.pass("accel.blas", |recorder| build::record(recorder, tables, &jobs, scratch, group))?;
+        for job in jobs {
+            if job.mode == BuildMode::Refit {
+                self.statistics.blas_refit += 1;
+                continue;
+            }
+            self.statistics.blas_built += 1;
+            let Some(blas) = self.blases.get(job.number) else { continue };
+            // A structure of its own: descriptors name another address, and what was inactive may be active.
+            let in_place =
+                blas.built.as_ref().is_some_and(|built| Arc::ptr_eq(&built.structure, &job.structure));
+            dirty.addresses |= !in_place && blas.built.is_some();
+            let boxes = boxes_of(tables, blas.key.mesh);
+            self.blases.adopt(job.number, Built { structure: job.structure, form: job.form, boxes });
         }
         Ok(())
     }
 
-    fn update_blas(&mut self, recorder: &mut Recorder, tables: &Tables, changed: &Changed) -> Result<()> {
-        let changed_meshes: BTreeSet<_> = changed.meshes.iter().copied().collect();
-        let mut wanted: BTreeSet<BlasKey> = BTreeSet::new();
-        for (_, slot) in tables.instances.iter() {
-            wanted.insert(BlasKey::of(slot, &tables.materials));
-        }
-        self.blas.retain(|key, _| wanted.contains(key) && !changed_meshes.contains(&key.mesh));
-        let missing: Vec<BlasKey> = wanted.into_iter().filter(|key| !self.blas.contains_key(key)).collect();
-        if missing.is_empty() {
-            return Ok(());
-        }
-        let (blas, scratch, group, device) =
-            (&mut self.blas, &mut self.scratch, self.blas_group, &self.device);
-        let built = recorder.pass("accel.blas", |recorder| {
-            blas::build_all(device, recorder, tables, &missing, scratch, group)
-        })?;
-        self.statistics.blas_built = built.len() as u64;
-        blas.extend(built);
-        Ok(())
+    fn note(&mut self, tables: &Tables, adopted: &Adopted) {
+        let statistics = &mut self.statistics;
+        statistics.blas_swapped = adopted.swapped.len() as u64;
+        statistics.blas_compacted = adopted.compacted;
+        statistics.blas_pending = self.blases.waiting.len() as u64;
+        statistics.blas_background = self.later.len() as u64;
+        statistics.blas_count = self.blases.len() as u64;
+        statistics.blas_bytes = self.blases.bytes();
+        statistics.instance_count = tables.instances.len() as u64;
+        statistics.triangle_count = tables.meshes.triangle_count();
+        statistics.add_up();
+    }
+
+    /// Whether work is left to later frames.
+    pub(crate) fn is_busy(&self) -> bool {
+        self.later.is_busy() || !self.blases.waiting.is_empty() || !self.blases.decayed.is_empty()
     }
 
     /// Puts the TLAS into the set of a frame that is free to record.
@@ -100,12 +251,50 @@ impl Accel {
     /// The uses of a pass that traces rays.
     pub(crate) fn uses(&self) -> [Use<'static>; 2] {
         [
-            Use::Group(self.tlas_group, Stage::RayTracing, Access::AccelTrace),
-            Use::Group(self.blas_group, Stage::RayTracing, Access::AccelTrace),
+            Use::Group(self.groups.tlas, Stage::RayTracing, Access::AccelTrace),
+            Use::Group(self.groups.blas, Stage::RayTracing, Access::AccelTrace),
         ]
+    }
+
+    /// The use of a copy of the descriptors back to the host.
+    pub(crate) fn download_uses(&self) -> [Use<'static>; 1] {
+        [Use::Group(self.groups.descriptors, Stage::Transfer, Access::TransferRead)]
+    }
+
+    /// Records the copy of the descriptors back to the host.
+    pub(crate) fn download_descriptors(&self, recorder: &mut Recorder) -> Result<Download> {
+        match self.tlas.descriptors() {
+            Some(buffer) => Download::of(recorder, buffer),
+            None => Ok(Download::default()),
+        }
+    }
+
+    /// Where the descriptor of a slot stands.
+    pub(crate) fn place_of(&self, slot: u32) -> u32 {
+        self.tlas.place_of(slot)
+    }
+
+    /// Key of the BLAS at a device address, in words.
+    pub(crate) fn key_at(&self, address: u64) -> Option<String> {
+        let at =
+            |blas: &blas::Blas| blas.built.as_ref().is_some_and(|built| built.structure.address() == address);
+        self.blases.iter().find(|(_, blas)| at(blas)).map(|(_, blas)| format!("{:?}", blas.key))
+    }
+
+    /// Keys of all BLASes, in words.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = String> {
+        self.blases.iter().map(|(_, blas)| format!("{:?}", blas.key))
     }
 
     pub(crate) fn statistics(&self) -> &AccelStatistics {
         &self.statistics
     }
+}
+
+/// Bounds of the primitives of a mesh where they stand now, mesh space.
+fn boxes_of(tables: &Tables, mesh: MeshId) -> Vec<(Vec3, Vec3)> {
+    let mesh = tables.meshes.get(mesh).ok();
+    mesh.map_or_else(Vec::new, |mesh| {
+        (0..mesh.geometry_count() as usize).map(|index| mesh.placed_bounds(index)).collect()
+    })
 }

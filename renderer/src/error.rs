@@ -58,6 +58,14 @@ pub enum RendererError {
         /// The id.
         id: String,
     },
+    /// A device was not measured, or its profile was not written.
+    #[error("{what}: {reason}")]
+    Profile {
+        /// A file, or what was measured.
+        what: String,
+        /// Why.
+        reason: String,
+    },
 }
 
 /// Result of this package.

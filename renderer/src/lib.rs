@@ -7,6 +7,7 @@ pub mod delta;
 mod error;
 mod frame;
 pub mod gpu_types;
+mod inventory;
 mod measure;
 mod needs;
 mod passes;
@@ -16,10 +17,15 @@ pub mod shader;
 mod tables;
 mod view;
 
+pub use accel::AccelPolicy;
 pub use accumulation::{Accumulation, BLOCK_SAMPLES, Sample};
 pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
-pub use measure::{AccelStatistics, LeftOut, Statistics, TlasWork};
+pub use inventory::{InstanceEntry, Inventory};
+pub use measure::{
+    AccelBench, AccelStatistics, BlasTimes, DeviceProfile, LeftOut, ProfileInForce, Statistics, TlasTimes,
+    TlasWork,
+};
 pub use needs::{Needs, SceneSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
 pub use settings::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};

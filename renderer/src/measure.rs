@@ -1,5 +1,9 @@
-//! What the renderer tells of itself: times, counts, memory, what was left out.
+//! What the renderer tells of itself: times, counts, memory, what was left out; and what it measures of a device.
 
+mod accel_bench;
+mod device_profile;
 mod statistics;
 
+pub use accel_bench::{AccelBench, BlasTimes, TlasTimes};
+pub use device_profile::{DeviceProfile, ProfileInForce};
 pub use statistics::{AccelStatistics, LeftOut, Statistics, TlasWork};

@@ -2,10 +2,8 @@
 //! This file holds what they share: how pipelines are built, and what a pass may touch.
 
 mod accumulate;
-#[expect(dead_code, reason = "the tables call it once they hold deforming instances")]
 mod deform;
 mod gbuffer;
-#[expect(dead_code, reason = "the TLAS calls it once its records are on the device")]
 mod instance_descriptors;
 mod post;
 mod shading;
@@ -23,7 +21,6 @@ use caustica_gpu::{
 pub(crate) use accumulate::Accumulate;
 pub(crate) use deform::Deform;
 pub(crate) use gbuffer::GBuffer;
-#[expect(unused_imports, reason = "the TLAS calls it once its records are on the device")]
 pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
 pub(crate) use post::Post;
 pub(crate) use shading::Shading;
@@ -172,6 +169,21 @@ impl Scope<'_> {
             recorder.trace_rays(pipeline, Some(self.set), binds, &uses, bytemuck::bytes_of(&push), size)
         })?;
         Ok(())
+    }
+}
+
+/// The passes that bring the scene itself up to date, whatever the views show.
+pub(crate) struct ScenePasses {
+    pub(crate) deform: Deform,
+    pub(crate) instance_descriptors: InstanceDescriptors,
+}
+
+impl ScenePasses {
+    pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
+        Ok(Self {
+            deform: Deform::new(device, library)?,
+            instance_descriptors: InstanceDescriptors::new(device, library)?,
+        })
     }
 }
 

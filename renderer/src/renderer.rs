@@ -8,14 +8,15 @@ use std::sync::Arc;
 use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse, Recorder};
 use glam::Vec3;
 
-use crate::accel::Accel;
+use crate::accel::{Accel, AccelPolicy};
 use crate::delta::{InstanceId, Invalidation, MaterialId, SceneDelta};
 use crate::error::{RendererError, Result};
 use crate::frame;
 use crate::gpu_types::AccumulatorPixel;
+use crate::inventory::{self, Inventory};
 use crate::measure::Statistics;
 use crate::needs::{Needs, SceneSummary};
-use crate::passes::{Builder, PassSet};
+use crate::passes::{Builder, PassSet, ScenePasses};
 use crate::settings::{Pipeline, ViewSettings};
 use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
 use crate::tables::{Changed, Tables};
@@ -26,6 +27,8 @@ use crate::view::{CameraMatrices, View, ViewId};
 pub struct RendererOptions {
     /// Read shaders from this folder instead of the copy in the binary.
     pub shaders: Option<PathBuf>,
+    /// When acceleration structures are built, refitted and compacted.
+    pub acceleration: AccelPolicy,
 }
 
 /// What is seen through a pixel.
@@ -56,6 +59,7 @@ pub struct Renderer {
     library: ShaderLibrary,
     tables: Tables,
     accel: Accel,
+    scene_passes: ScenePasses,
     views: BTreeMap<ViewId, View>,
     next_view: u32,
     passes: HashMap<(Pipeline, Needs), PassSet>,
@@ -74,17 +78,19 @@ impl Renderer {
         let tables = Tables::new(device, &mut recorder)?;
         frames.submit(recorder, None)?;
         let sources = ShaderSources::new(options.shaders.clone());
+        let mut library = ShaderLibrary::new(device, sources, SpirvCache::of_user());
         let kind = MemoryUse::Staging;
         Ok(Self {
             device: Arc::clone(device),
-            library: ShaderLibrary::new(device, sources, SpirvCache::of_user()),
+            scene_passes: ScenePasses::new(device, &mut library)?,
+            library,
             tables,
-            accel: Accel::new(device),
+            accel: Accel::new(device, options.acceleration)?,
             views: BTreeMap::new(),
             next_view: 0,
             passes: HashMap::new(),
             summary: SceneSummary::without_materials(),
-            changed: Changed { structure: true, ..Changed::default() },
+            changed: Changed { all: true, ..Changed::default() },
             picked: Buffer::new(device, "pick", 32, BufferUse::General, Location::ReadBack, kind)?,
         })
     }
@@ -95,33 +101,56 @@ impl Renderer {
     /// # Errors
     /// When the delta names what is not there, or memory runs out.
     pub fn apply(&mut self, recorder: &mut Recorder, delta: &SceneDelta) -> Result<()> {
-        self.tables.settle_transforms();
+        self.tables.settle();
         if !delta.is_empty() {
-            let changed =
-                self.tables.apply(recorder, delta).inspect_err(|_| self.changed.structure = true)?;
-            self.changed.structure |= changed.structure;
-            self.changed.moved.extend(changed.moved);
-            self.changed.meshes.extend(changed.meshes);
-            self.summary = summarize(&self.tables);
+            let applied = self.tables.apply(recorder, delta, &mut self.changed);
+            applied.inspect_err(|_| self.changed.all = true)?;
+            if changes_needs(delta) {
+                self.summary = summarize(&self.tables);
+            }
             let what =
                 if delta.render_origin_changed { Invalidation::Everything } else { Invalidation::Scene };
             let reason = if delta.reason.is_empty() { "scene" } else { &delta.reason };
-            for view in self.views.values_mut() {
-                view.accumulation.invalidate(what, reason);
-            }
+            self.invalidate(what, reason);
         }
-        self.tables.flush(recorder)?;
         let slot = recorder.slot();
-        let changed = std::mem::take(&mut self.changed);
-        if let Err(error) = self.accel.update(recorder, &self.tables, &changed) {
-            self.changed = Changed { structure: true, ..changed };
+        let mut changed = std::mem::take(&mut self.changed);
+        if let Err(error) = self.tables.flush(recorder, &self.scene_passes.deform, &mut changed) {
+            self.changed = Changed { all: true, ..changed };
             return Err(error);
+        }
+        match self.accel.update(recorder, &self.tables, &changed, &self.scene_passes.instance_descriptors) {
+            Ok(true) => self.invalidate(Invalidation::Scene, "built what was pending"),
+            Ok(false) => {}
+            Err(error) => {
+                self.changed = Changed { all: true, ..changed };
+                return Err(error);
+            }
         }
         self.tables.textures.update_set(slot);
         let Tables { environment, textures, .. } = &mut self.tables;
         environment.update_set(slot, textures.set_of(slot));
         self.accel.update_set(slot, self.tables.textures.set_of(slot));
         Ok(())
+    }
+
+    fn invalidate(&mut self, what: Invalidation, reason: &str) {
+        for view in self.views.values_mut() {
+            view.accumulation.invalidate(what, reason);
+        }
+    }
+
+    /// Whether acceleration structures are left to be built or to be made better in later frames.
+    pub fn is_busy(&self) -> bool {
+        self.accel.is_busy()
+    }
+
+    /// What is on the device, by id. Waits for the device.
+    ///
+    /// # Errors
+    /// When tables contradict each other, or the device fails.
+    pub fn inventory(&self, frames: &mut Frames) -> Result<Inventory> {
+        inventory::take(&self.tables, &self.accel, frames)
     }
 
     /// Makes a view. `window`: its image is encoded for a window and carries the outline of the selection.
@@ -315,6 +344,18 @@ impl Renderer {
             (camera.translation.into(), camera.transform_vector3(at.extend(-1.0)).normalize())
         })
     }
+}
+
+/// Whether a delta can change what is needed: transforms and poses cannot.
+fn changes_needs(delta: &SceneDelta) -> bool {
+    !(delta.meshes.is_empty()
+        && delta.materials.is_empty()
+        && delta.instances.is_empty()
+        && delta.removed_instances.is_empty()
+        && delta.visibility.is_empty()
+        && delta.lights.is_empty()
+        && delta.removed_lights.is_empty()
+        && delta.environment.is_none())
 }
 
 /// Counts what the scene holds.

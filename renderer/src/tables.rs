@@ -2,8 +2,8 @@
 //! and what the acceleration structures and `needs` want to know. Only what changed is uploaded.
 
 pub(crate) mod alias;
+mod apply;
 mod deformation;
-#[expect(dead_code, reason = "the tables call it once they hold deforming instances")]
 mod deforming;
 mod draws;
 mod emissive;
@@ -12,10 +12,12 @@ mod instances;
 mod lights;
 mod materials;
 mod meshes;
+mod snapshot;
 mod spatial_order;
 mod table;
 mod textures;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use caustica_gpu::{Access, Device, Recorder, ResourceId, Stage, Use};
@@ -24,28 +26,37 @@ pub(crate) use draws::Batch;
 pub(crate) use instances::{Instances, Slot};
 pub(crate) use materials::{Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits};
 pub(crate) use meshes::{Meshes, rows_of};
+pub(crate) use snapshot::Snapshot;
 pub(crate) use spatial_order::order_of;
-pub(crate) use table::Table;
+pub(crate) use table::{Download, Table};
 
-use crate::delta::SceneDelta;
+use crate::delta::{InstanceId, MeshId};
 use crate::error::Result;
 use crate::gpu_types;
+use crate::passes::Deform;
 
+use deforming::Deforming;
 use draws::Draws;
 use emissive::Emissive;
 use environment::EnvironmentTable;
 use lights::Lights;
 use textures::Textures;
 
-/// What changed on the device by one delta, for the acceleration structures.
+/// What changed on the device, for the acceleration structures.
 #[derive(Debug, Default)]
 pub(crate) struct Changed {
-    /// Instances were added, removed, or got another mesh, material opacity or visibility.
-    pub(crate) structure: bool,
+    /// Everything is to be looked at anew, after an error.
+    pub(crate) all: bool,
+    /// Slots that are new or free, or of another mesh, material or visibility.
+    pub(crate) slots: BTreeSet<u32>,
     /// Slots of which the transform changed.
     pub(crate) moved: Vec<u32>,
-    /// Meshes that are new or changed.
-    pub(crate) meshes: Vec<crate::delta::MeshId>,
+    /// Meshes with new content.
+    pub(crate) meshes: BTreeSet<MeshId>,
+    /// Meshes with primitives that moved.
+    pub(crate) reshaped: BTreeSet<MeshId>,
+    /// Instances whose vertices were evaluated anew.
+    pub(crate) deformed: Vec<InstanceId>,
 }
 
 /// The scene on the device.
@@ -58,6 +69,7 @@ pub(crate) struct Tables {
     pub(crate) emissive: Emissive,
     pub(crate) environment: EnvironmentTable,
     pub(crate) draws: Draws,
+    pub(crate) deforming: Deforming,
     scene: Table<gpu_types::Scene>,
     /// Stands for every table in the barrier tracker: they are read by address, which no binding shows.
     group: ResourceId,
@@ -75,79 +87,30 @@ impl Tables {
             emissive: Emissive::new(device),
             environment: EnvironmentTable::new(device, recorder)?,
             draws: Draws::new(device),
+            deforming: Deforming::new(device),
             scene: Table::new(device, "scene"),
             group: device.new_resource_id(),
             geometry_group: device.new_resource_id(),
         })
     }
 
-    /// Takes a delta in; the caller uploads with [`Self::flush`] in the same frame.
-    ///
-    /// # Errors
-    /// When the delta names what is not there, or memory runs out.
-    pub(crate) fn apply(&mut self, recorder: &mut Recorder, delta: &SceneDelta) -> Result<Changed> {
-        let mut changed = Changed::default();
-        if !delta.meshes.is_empty() || !delta.textures.is_empty() {
-            recorder.declare(&[Use::Group(self.geometry_group, Stage::Transfer, Access::TransferWrite)]);
-        }
-        for (id, mesh) in &delta.meshes {
-            self.meshes.set(recorder, *id, mesh)?;
-            changed.meshes.push(*id);
-        }
-        for (id, texture) in &delta.textures {
-            self.textures.set(recorder, *id, texture)?;
-        }
-        for id in &delta.removed_textures {
-            self.textures.remove(*id);
-        }
-        let mut flipped = false;
-        for (id, material) in &delta.materials {
-            flipped |= self.materials.set(*id, material, &self.textures);
-        }
-        for id in &delta.removed_materials {
-            self.materials.remove(*id);
-        }
-        for id in &delta.removed_instances {
-            self.instances.remove(*id);
-        }
-        for (id, instance) in &delta.instances {
-            self.instances.set(*id, instance, &self.meshes, &self.materials)?;
-        }
-        for (id, transform) in &delta.transforms {
-            changed.moved.extend(self.instances.set_transform(*id, *transform)?);
-        }
-        for id in &delta.removed_meshes {
-            self.meshes.remove(*id);
-        }
-        self.lights.apply(delta);
-        if let Some(environment) = &delta.environment {
-            self.environment.set(recorder, environment)?;
-        }
-        if !delta.meshes.is_empty() {
-            self.instances.follow_meshes(&changed.meshes, &self.meshes)?;
-        }
-        let instances_changed = !delta.instances.is_empty() || !delta.removed_instances.is_empty();
-        changed.structure = instances_changed || flipped || !delta.meshes.is_empty();
-        if changed.structure || !delta.materials.is_empty() {
-            self.draws.rebuild(&self.instances, &self.materials, &self.meshes);
-            self.emissive.rebuild(&self.instances, &self.materials, &self.meshes);
-        } else if !changed.moved.is_empty() {
-            self.emissive.follow_transforms(&changed.moved, &self.instances, &self.materials, &self.meshes);
-            self.draws.follow_mirrored(&changed.moved, &self.instances, &self.materials, &self.meshes);
-        }
-        Ok(changed)
-    }
-
-    /// Makes the previous transforms of what moved in the last frame equal to the present ones.
-    pub(crate) fn settle_transforms(&mut self) {
+    /// A frame has gone by: what moved in it has its present place as its previous one.
+    pub(crate) fn settle(&mut self) {
         self.instances.settle();
+        self.meshes.settle();
+        self.deforming.settle();
     }
 
-    /// Uploads every changed entry.
+    /// Uploads every changed entry and evaluates every new pose; adds the instances that changed shape to `changed`.
     ///
     /// # Errors
     /// When memory runs out.
-    pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
+    pub(crate) fn flush(
+        &mut self,
+        recorder: &mut Recorder,
+        deform: &Deform,
+        changed: &mut Changed,
+    ) -> Result<()> {
         let waits = [
             self.instances.is_dirty(),
             self.materials.is_dirty(),
@@ -158,6 +121,10 @@ impl Tables {
         ];
         if waits.contains(&true) {
             recorder.declare(&[Use::Group(self.group, Stage::Transfer, Access::TransferWrite)]);
+        }
+        if self.meshes.is_dirty() {
+            recorder.declare(&[Use::Group(self.geometry_group, Stage::Transfer, Access::TransferWrite)]);
+            self.meshes.flush(recorder)?;
         }
         self.instances.flush(recorder)?;
         self.materials.flush(recorder)?;
@@ -171,6 +138,7 @@ impl Tables {
             self.scene.set(0, record);
             self.scene.flush(recorder)?;
         }
+        changed.deformed.extend(self.deforming.record(recorder, deform, self.geometry_group)?);
         Ok(())
     }
 
@@ -187,9 +155,30 @@ impl Tables {
         ]
     }
 
+    /// The uses of a copy of the tables back to the host.
+    pub(crate) fn download_uses(&self) -> [Use<'static>; 2] {
+        [self.group, self.geometry_group].map(|id| Use::Group(id, Stage::Transfer, Access::TransferRead))
+    }
+
     /// The use of the vertices as input of acceleration structure builds.
     pub(crate) fn build_input(&self) -> Use<'static> {
         Use::Group(self.geometry_group, Stage::AccelBuild, Access::BuildInput)
+    }
+
+    /// A copy of what a build in the background reads: of a mesh, or of an instance of it that deforms.
+    pub(crate) fn snapshot(
+        &self,
+        recorder: &mut Recorder,
+        mesh: MeshId,
+        deforming: Option<InstanceId>,
+    ) -> Result<Snapshot> {
+        let mesh = self.meshes.get(mesh)?;
+        let posed = deforming.and_then(|id| self.deforming.get(id));
+        let (records, positions) = match posed {
+            Some(posed) => (&posed.geometries, Some(&posed.positions)),
+            None => (&mesh.geometries, None),
+        };
+        Snapshot::new(recorder, &mesh.vertices, records, positions, self.geometry_group)
     }
 
     fn record(&self) -> gpu_types::Scene {

@@ -46,7 +46,8 @@ pub struct Run {
     pub stderr: String,
 }
 
-/// Runs the program in `folder` without a display.
+/// Runs the program in `folder` without a display, and without what the user has configured: its configuration is the
+/// folder `config` in there.
 ///
 /// # Panics
 /// When it cannot be started, or when it panicked.
@@ -54,6 +55,7 @@ pub fn caustica(folder: &Path, arguments: &[&str]) -> Run {
     let mut command = Command::new(program());
     command.current_dir(folder).args(arguments);
     command
+        .env("XDG_CONFIG_HOME", std::path::absolute(folder).unwrap_or_default().join("config"))
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY")
         .env_remove("CAUSTICA_LOG")

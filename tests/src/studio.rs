@@ -1,7 +1,9 @@
 //! A renderer with one view. Enters: a delta, a camera, settings. Leaves: mean radiance, the display image, figures.
 
 use caustica_renderer::delta::{Camera, SceneDelta};
-use caustica_renderer::{Accumulated, Renderer, RendererOptions, Statistics, View, ViewId, ViewSettings};
+use caustica_renderer::{
+    AccelPolicy, Accumulated, Renderer, RendererOptions, Statistics, View, ViewId, ViewSettings,
+};
 
 use crate::gpu::{Session, session};
 use crate::shaders_under_test;
@@ -30,8 +32,29 @@ impl Studio {
     /// # Panics
     /// When the device cannot.
     pub fn with_window(extent: [u32; 2], settings: ViewSettings, window: bool) -> Self {
+        Self::make(extent, settings, window, AccelPolicy::default())
+    }
+
+    /// A studio with this scene, whose acceleration structures follow a policy.
+    ///
+    /// # Panics
+    /// When the device cannot.
+    pub fn with_policy(
+        extent: [u32; 2],
+        settings: ViewSettings,
+        policy: AccelPolicy,
+        scene: &SceneDelta,
+        camera: Camera,
+    ) -> Self {
+        let mut studio = Self::make(extent, settings, false, policy);
+        studio.view_mut().set_camera(camera);
+        studio.apply(scene);
+        studio
+    }
+
+    fn make(extent: [u32; 2], settings: ViewSettings, window: bool, acceleration: AccelPolicy) -> Self {
         let mut session = session();
-        let options = RendererOptions { shaders: shaders_under_test() };
+        let options = RendererOptions { shaders: shaders_under_test(), acceleration };
         let mut renderer = Renderer::new(&session.device, &mut session.frames, &options).expect("a renderer");
         let view = renderer.create_view(extent, settings, window).expect("a view");
         Self { renderer, view, session }

@@ -1,12 +1,15 @@
 //! What nodes refer to: meshes, materials, textures, lights, cameras, the environment.
 //! Plain data, large arrays behind `Arc` so that clones are cheap. Knows no file format and no device.
 
+mod deform;
 mod environment;
 mod light;
 mod material;
 mod mesh;
 mod texture;
 
+pub(crate) use deform::{Bounds, join, moved};
+pub use deform::{DeformPose, MorphTarget, SkinData};
 pub use environment::{Environment, EnvironmentFile, RadianceMap};
 pub use light::{Camera, Light, LightKind, Projection};
 pub use material::{AlphaMode, Material, ShadingMode};

@@ -123,7 +123,7 @@ impl Audit<'_> {
             self.add(Severity::Error, Subject::Prefab(id), &prefab.name, message);
         }
         for (id, node) in self.document.nodes() {
-            let NodeKind::Prefab { prefab, overrides } = &node.kind else {
+            let NodeKind::Prefab { prefab, overrides, .. } = &node.kind else {
                 continue;
             };
             let Some(prefab) = self.document.prefab(*prefab).filter(|p| !p.missing) else {

@@ -32,18 +32,23 @@ pub struct ChangeSet {
     pub added: BTreeMap<Target, Content>,
     /// Targets with content that are gone, with what they were.
     pub removed: BTreeMap<Target, Content>,
-    /// Targets with content whose world transform changed.
+    /// Targets with content whose world transform changed; for a mesh, its `world_from_mesh`.
     pub transforms: BTreeMap<Target, Content>,
-    /// Targets with content of which visibility or materials changed.
+    /// Targets with content of which materials changed.
     pub instances: BTreeMap<Target, Content>,
+    /// Targets with content of which only the visibility changed: their own, that of something above, or which
+    /// rays meet them.
+    pub visibility: BTreeMap<Target, Content>,
+    /// Placed meshes whose [`crate::DeformPose`] changed.
+    pub poses: BTreeSet<Target>,
     /// Lights whose own values changed.
     pub lights: BTreeSet<Target>,
     /// Cameras whose own values changed.
     pub cameras: BTreeSet<Target>,
     /// New meshes and meshes of which vertices changed.
     pub meshes: BTreeSet<MeshId>,
-    /// Meshes of which only a primitive was moved.
-    pub primitive_transforms: BTreeSet<MeshId>,
+    /// Primitives that were moved inside their mesh, which is not in `meshes`.
+    pub primitive_transforms: BTreeSet<(MeshId, u32)>,
     /// Meshes that left the document; one that came and went between two drains may be named too.
     pub removed_meshes: BTreeSet<MeshId>,
     /// New or changed materials.
@@ -54,7 +59,7 @@ pub struct ChangeSet {
     pub textures: BTreeSet<TextureId>,
     /// Textures that left the document, likewise.
     pub removed_textures: BTreeSet<TextureId>,
-    /// The effective environment may be another: ask the document for it.
+    /// The effective environment is another: ask the document for it.
     pub environment: bool,
     /// Names, order, parents or the default camera changed: lists on the screen are stale.
     pub structure: bool,
@@ -69,6 +74,8 @@ impl ChangeSet {
             && self.removed.is_empty()
             && self.transforms.is_empty()
             && self.instances.is_empty()
+            && self.visibility.is_empty()
+            && self.poses.is_empty()
             && self.lights.is_empty()
             && self.cameras.is_empty()
             && self.meshes.is_empty()
@@ -101,8 +108,7 @@ impl ChangeSet {
             return;
         }
         self.removed.remove(&target);
-        self.transforms.remove(&target);
-        self.instances.remove(&target);
+        self.forget_details(target);
         self.added.insert(target, content);
     }
 
@@ -112,8 +118,7 @@ impl ChangeSet {
             return;
         }
         self.added.remove(&target);
-        self.transforms.remove(&target);
-        self.instances.remove(&target);
+        self.forget_details(target);
         self.lights.remove(&target);
         self.cameras.remove(&target);
         if known {
@@ -121,15 +126,44 @@ impl ChangeSet {
         }
     }
 
-    pub(crate) fn target_moved(&mut self, target: Target, content: Content) {
-        if !content.is_empty() && !self.added.contains_key(&target) {
-            self.transforms.insert(target, content);
+    fn forget_details(&mut self, target: Target) {
+        for details in [&mut self.transforms, &mut self.instances, &mut self.visibility] {
+            details.remove(&target);
         }
+        self.poses.remove(&target);
+    }
+
+    pub(crate) fn target_moved(&mut self, target: Target, content: Content) {
+        note(&mut self.transforms, &self.added, target, content);
     }
 
     pub(crate) fn target_changed(&mut self, target: Target, content: Content) {
-        if !content.is_empty() && !self.added.contains_key(&target) {
-            self.instances.insert(target, content);
+        note(&mut self.instances, &self.added, target, content);
+    }
+
+    pub(crate) fn target_shown(&mut self, target: Target, content: Content) {
+        note(&mut self.visibility, &self.added, target, content);
+    }
+
+    pub(crate) fn target_bent(&mut self, target: Target) {
+        if !self.added.contains_key(&target) {
+            self.poses.insert(target);
         }
     }
+}
+
+/// A new target is sent whole, so that nothing else has to be said about it.
+fn note(
+    details: &mut BTreeMap<Target, Content>,
+    added: &BTreeMap<Target, Content>,
+    target: Target,
+    content: Content,
+) {
+    if content.is_empty() || added.contains_key(&target) {
+        return;
+    }
+    let noted = details.entry(target).or_default();
+    noted.mesh |= content.mesh;
+    noted.light |= content.light;
+    noted.camera |= content.camera;
 }

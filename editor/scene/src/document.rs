@@ -3,28 +3,36 @@
 //! what is placed (`place.rs`). It knows no file and no device.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use glam::DAffine3;
 
+use crate::animation::ClipChoice;
 use crate::assets::{Camera, Environment, Light, Material, Mesh, Texture};
 use crate::changes::{ChangeSet, Content};
 use crate::edit::shown;
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
-use crate::node::{Node, NodeKind};
+use crate::node::{Node, NodeKind, RayVisibility};
 use crate::package::MaterialEntry;
 use crate::prefab::{PartNode, PartOverride, Prefab};
 use crate::transform::Local;
 
 mod apply;
+mod apply_animation;
 mod apply_prefab;
 mod apply_tree;
 mod place;
+mod pose;
 mod propagate;
+mod report;
+mod surroundings;
 
 pub use place::{Placed, Renderable};
+use pose::Pose;
+use surroundings::Surroundings;
 
 /// A scene that is being edited. Cloning is cheap in vertices and texels, which are shared.
-/// Equality compares what the user made, not caches, pending changes or the id counter.
+/// Equality compares what the user made, not the time that is shown, caches, pending changes or the id counter.
 #[derive(Clone, Debug)]
 pub struct Document {
     slots: BTreeMap<NodeId, Slot>,
@@ -43,6 +51,11 @@ pub struct Document {
     changes: ChangeSet,
     /// Targets that the reader of the changes knows.
     reported: BTreeSet<Target>,
+    /// The time that is shown, seconds; `None`: everything is at rest.
+    time_s: Option<f64>,
+    /// Instances whose source has clips.
+    animated: BTreeSet<NodeId>,
+    surroundings: Surroundings,
 }
 
 /// A node with what is derived from it.
@@ -62,9 +75,13 @@ struct Slot {
 #[derive(Clone, Debug, Default)]
 struct PartStates {
     worlds: Vec<DAffine3>,
+    /// Transforms against the instance, so that moving it leaves them alone to the bit; empty without skins.
+    in_instance: Vec<DAffine3>,
     shown: Vec<bool>,
     /// The overrides by index instead of by path; those without a part are left out.
     overrides: BTreeMap<u32, PartOverride>,
+    /// What the time that is shown lays over them; instances in the same pose share it.
+    pose: Arc<Pose>,
 }
 
 impl Default for Document {
@@ -104,6 +121,9 @@ impl Document {
             dirty_parts: BTreeSet::new(),
             changes: ChangeSet { environment: true, structure: true, ..ChangeSet::default() },
             reported: BTreeSet::new(),
+            time_s: None,
+            animated: BTreeSet::new(),
+            surroundings: Surroundings::default(),
         }
     }
 
@@ -247,7 +267,8 @@ impl Document {
         }
     }
 
-    /// Transform against the parent, overrides included.
+    /// Transform against the parent, overrides included: what the document says, also while a time is shown
+    /// (see [`Self::posed_local`]).
     pub fn local(&self, target: Target) -> Option<Local> {
         if target.part.is_none() {
             return self.node(target.node).map(|node| node.local);
@@ -265,6 +286,23 @@ impl Document {
         let part = self.part(target)?;
         let set = self.part_override(target).and_then(|o| o.visible);
         Some(set.unwrap_or(part.visible))
+    }
+
+    /// Which rays meet the mesh of a node or part, overrides included.
+    pub fn ray_visibility(&self, target: Target) -> Option<RayVisibility> {
+        if target.part.is_none() {
+            return self.node(target.node).map(|node| node.ray_visibility);
+        }
+        self.part(target)?;
+        Some(self.part_override(target).and_then(|o| o.ray_visibility).unwrap_or_default())
+    }
+
+    /// Which clips an instance plays; the default for what is no instance.
+    pub fn clip_of(&self, node: NodeId) -> ClipChoice {
+        match self.node(node).map(|node| &node.kind) {
+            Some(NodeKind::Prefab { clip, .. }) => *clip,
+            _ => ClipChoice::default(),
+        }
     }
 
     /// What a target hangs below: a part's parent part, or the instance for its topmost parts.
@@ -345,78 +383,11 @@ impl Document {
             None => self.node(target.node).map(|node| node_content(&node.kind)).unwrap_or_default(),
         }
     }
+}
 
-    /// Brings transforms up to date and hands out what changed since the last call. The first call tells of
-    /// everything as added. Work is proportional to the change.
-    pub fn drain_changes(&mut self) -> ChangeSet {
-        self.update_transforms();
-        let mut changes = std::mem::take(&mut self.changes);
-        let known_whole = |target: &Target| !changes.added.contains_key(target);
-        changes.lights.retain(known_whole);
-        changes.cameras.retain(known_whole);
-        let meshes = &changes.meshes;
-        changes.primitive_transforms.retain(|id| !meshes.contains(id));
-        let light_may_differ = changes.structure
-            || !changes.added.is_empty()
-            || !changes.removed.is_empty()
-            || !changes.instances.is_empty()
-            || !changes.lights.is_empty()
-            || !changes.materials.is_empty();
-        changes.environment |= light_may_differ && self.environment == Environment::Auto;
-        for target in changes.removed.keys() {
-            self.reported.remove(target);
-        }
-        self.reported.extend(changes.added.keys().copied());
-        changes
-    }
-
-    /// Makes the next drain tell of everything as added, as for a renderer that starts afresh.
-    pub fn mark_all_added(&mut self, reason: &str) {
-        self.changes = ChangeSet {
-            environment: true,
-            structure: true,
-            meshes: self.meshes.keys().copied().collect(),
-            materials: self.materials.keys().copied().collect(),
-            textures: self.textures.keys().copied().collect(),
-            ..ChangeSet::default()
-        };
-        self.changes.add_reason(reason.to_owned());
-        self.reported.clear();
-        let ids: Vec<NodeId> = self.slots.keys().copied().collect();
-        for id in ids {
-            self.report_added(id);
-        }
-    }
-
-    /// Tells of a node and the parts of its instance as added.
-    fn report_added(&mut self, id: NodeId) {
-        let Some(slot) = self.slots.get(&id) else {
-            return;
-        };
-        let own = node_content(&slot.node.kind);
-        self.changes.target_added(Target::node(id), own);
-        if let Some(prefab) = slot.node.prefab().and_then(|p| self.prefabs.get(&p)) {
-            for (part, node) in prefab.nodes().iter().enumerate() {
-                self.changes.target_added(Target::part(id, part as u32), part_content(node));
-            }
-        }
-    }
-
-    /// Tells of a node and the parts of its instance as removed.
-    fn report_removed(&mut self, id: NodeId) {
-        let Some(slot) = self.slots.get(&id) else {
-            return;
-        };
-        let mut gone = vec![(Target::node(id), node_content(&slot.node.kind))];
-        if let Some(prefab) = slot.node.prefab().and_then(|p| self.prefabs.get(&p)) {
-            let parts = prefab.nodes().iter().enumerate();
-            gone.extend(parts.map(|(p, node)| (Target::part(id, p as u32), part_content(node))));
-        }
-        for (target, content) in gone {
-            let known = self.reported.contains(&target);
-            self.changes.target_removed(target, content, known);
-        }
-    }
+/// The prefab that a node instances.
+fn prefab_of<'a>(prefabs: &'a BTreeMap<PrefabId, Prefab>, slot: &Slot) -> Option<&'a Prefab> {
+    prefabs.get(&slot.node.prefab()?)
 }
 
 fn node_content(kind: &NodeKind) -> Content {

@@ -3,6 +3,7 @@
 
 use glam::DAffine3;
 
+use crate::animation::ClipChoice;
 use crate::assets::{Camera, Environment, Light, Material};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target};
@@ -33,6 +34,29 @@ pub enum Edit {
         target: Target,
         /// True: shown.
         visible: bool,
+    },
+    /// Says which rays meet the mesh of a node or part; what hangs below does not follow.
+    SetRayVisibility {
+        /// What it is about.
+        target: Target,
+        /// The camera sees it.
+        camera_visible: bool,
+        /// It stops light on its way.
+        casts_shadows: bool,
+    },
+    /// Weighs the morph targets of a placed mesh. A clip that moves the weights outdoes it while a time is shown.
+    SetMorphWeights {
+        /// The node or part that places the mesh.
+        target: Target,
+        /// One a morph target; of a node also none: those of the mesh.
+        weights: Vec<f32>,
+    },
+    /// Chooses what an instance plays.
+    SetClip {
+        /// The instance.
+        node: NodeId,
+        /// The clips.
+        clip: ClipChoice,
     },
     /// Makes a part follow its prefab again in one respect.
     ResetOverride {
@@ -156,6 +180,10 @@ pub enum OverrideField {
     Light,
     /// Its camera.
     Camera,
+    /// The weights of its morph targets.
+    Weights,
+    /// Which rays meet it.
+    RayVisibility,
     /// Everything.
     All,
 }
@@ -185,6 +213,14 @@ pub enum EditError {
     NoPrimitive {
         /// The index.
         primitive: u32,
+    },
+    /// There are more or fewer values than things that they are for.
+    #[error("{found} weights for {wanted} morph targets")]
+    WeightCount {
+        /// Number of morph targets.
+        wanted: usize,
+        /// Number of weights.
+        found: usize,
     },
     /// An id is taken.
     #[error("{0} is already in the scene")]
@@ -239,6 +275,11 @@ impl Edit {
             Self::SetVisible { target, visible } => {
                 format!("{} {}", if *visible { "showed" } else { "hid" }, name(target))
             }
+            Self::SetRayVisibility { target, .. } => {
+                format!("changed the ray visibility of {}", name(target))
+            }
+            Self::SetMorphWeights { target, .. } => format!("shaped {}", name(target)),
+            Self::SetClip { node, clip } => describe_clip(document, *node, *clip),
             Self::ResetOverride { target, .. } => format!("reset {}", name(target)),
             Self::AssignMaterial { target, material, .. } => {
                 format!("gave {} to {}", material_name(material), name(target))
@@ -283,6 +324,7 @@ impl Edit {
             (Self::SetTransform { target: a, .. }, Self::SetTransform { target: b, .. })
             | (Self::Rename { target: a, .. }, Self::Rename { target: b, .. })
             | (Self::SetLight { target: a, .. }, Self::SetLight { target: b, .. })
+            | (Self::SetMorphWeights { target: a, .. }, Self::SetMorphWeights { target: b, .. })
             | (Self::SetCamera { target: a, .. }, Self::SetCamera { target: b, .. }) => a == b,
             (Self::SetMaterial { material: a, .. }, Self::SetMaterial { material: b, .. }) => a == b,
             (Self::SetEnvironment(_), Self::SetEnvironment(_)) => true,
@@ -294,6 +336,20 @@ impl Edit {
                 a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.same_gesture(b))
             }
             _ => false,
+        }
+    }
+}
+
+fn describe_clip(document: &Document, node: NodeId, clip: ClipChoice) -> String {
+    let name = document.display_name(Target::node(node));
+    let clips = document.clips_of(node);
+    match clip {
+        ClipChoice::None => format!("stopped {name}"),
+        ClipChoice::All => format!("let {name} play all clips"),
+        ClipChoice::First => format!("let {name} play its first clip"),
+        ClipChoice::Clip(index) => {
+            let clip_name = clips.get(index as usize).map_or("", |clip| clip.name.as_str());
+            format!("let {name} play {}", shown(clip_name, "clip", index.into()))
         }
     }
 }

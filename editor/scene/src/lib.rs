@@ -2,6 +2,7 @@
 //! In: files and edits. Out: a [`Document`] with double-precision transforms and a [`ChangeSet`] of what changed.
 //! It knows no window and no device, and it does not know the renderer.
 
+mod animation;
 mod assets;
 mod audit;
 mod changes;
@@ -15,17 +16,19 @@ mod prefab;
 mod project;
 mod transform;
 
+pub use animation::{Animation, Channel, ChannelPath, ClipChoice, Interpolation, Sample};
 pub use assets::{
-    AlphaMode, Camera, Environment, EnvironmentFile, Light, LightKind, Material, Mesh, MeshData, Primitive,
-    Projection, RadianceMap, Sampler, ShadingMode, Texture, TextureUse, Wrap,
+    AlphaMode, Camera, DeformPose, Environment, EnvironmentFile, Light, LightKind, Material, Mesh, MeshData,
+    MorphTarget, Primitive, Projection, RadianceMap, Sampler, ShadingMode, SkinData, Texture, TextureUse,
+    Wrap,
 };
 pub use audit::{Finding, Severity, Subject, audit};
 pub use changes::{ChangeSet, Content};
 pub use document::{Document, Placed, Renderable};
 pub use edit::{Edit, EditError, OverrideField};
 pub use ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
-pub use node::{Node, NodeKind, Subtree};
+pub use node::{Node, NodeKind, RayVisibility, Subtree};
 pub use package::{MaterialEntry, PrefabPackage};
-pub use prefab::{PartNode, PartOrderError, PartOverride, PartPath, Prefab};
+pub use prefab::{PartNode, PartOrderError, PartOverride, PartPath, Prefab, Skin};
 pub use project::{Project, ProjectError, ProjectMeta, ProjectProblem, SCHEMA_VERSION};
 pub use transform::{Local, Trs, is_degenerate, rigid};

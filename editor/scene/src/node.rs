@@ -3,6 +3,9 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
+use crate::animation::ClipChoice;
 use crate::assets::{Camera, Light};
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId};
 use crate::prefab::{PartOverride, PartPath};
@@ -21,8 +24,26 @@ pub struct Node {
     pub local: Local,
     /// False: it and everything below is hidden.
     pub visible: bool,
+    /// Which rays meet the mesh that it places; nothing below follows it.
+    pub ray_visibility: RayVisibility,
     /// What it is.
     pub kind: NodeKind,
+}
+
+/// Which rays meet a placed mesh, as Blender's ray visibility.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct RayVisibility {
+    /// The camera sees it. False: only mirrors, glass and shadows tell of it.
+    pub camera_visible: bool,
+    /// It stops light on its way.
+    pub casts_shadows: bool,
+}
+
+impl Default for RayVisibility {
+    fn default() -> Self {
+        Self { camera_visible: true, casts_shadows: true }
+    }
 }
 
 /// What a node is.
@@ -37,6 +58,8 @@ pub enum NodeKind {
         /// What this instance says differently, by path in the source. Paths that the source no longer
         /// has are kept.
         overrides: BTreeMap<PartPath, PartOverride>,
+        /// What it plays.
+        clip: ClipChoice,
     },
     /// Places a mesh.
     Mesh {
@@ -44,11 +67,20 @@ pub enum NodeKind {
         mesh: MeshId,
         /// One material for each primitive of the mesh.
         materials: Vec<MaterialId>,
+        /// Weights of the mesh's morph targets; empty: those of the mesh.
+        weights: Vec<f32>,
     },
     /// A light.
     Light(Light),
     /// A camera.
     Camera(Camera),
+}
+
+impl NodeKind {
+    /// An instance of a prefab that follows it in everything.
+    pub fn instance_of(prefab: PrefabId) -> Self {
+        Self::Prefab { prefab, overrides: BTreeMap::new(), clip: ClipChoice::default() }
+    }
 }
 
 impl Node {
@@ -60,6 +92,7 @@ impl Node {
             children: Vec::new(),
             local: Local::default(),
             visible: true,
+            ray_visibility: RayVisibility::default(),
             kind,
         }
     }

@@ -132,7 +132,7 @@ impl Document {
         local: Local,
     ) -> (NodeId, Edit) {
         let name = self.prefab(prefab).map_or_else(String::new, |p| p.name.clone());
-        let kind = NodeKind::Prefab { prefab, overrides: Default::default() };
+        let kind = NodeKind::instance_of(prefab);
         self.add_edit(Node::new(name, kind).with_local(local), parent)
     }
 

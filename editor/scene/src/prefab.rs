@@ -5,11 +5,15 @@
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
+use crate::animation::Animation;
 use crate::assets::{Camera, Environment, Light};
 use crate::ids::{MaterialId, MeshId, TextureId};
+use crate::node::RayVisibility;
 use crate::transform::Local;
 
 /// One node of an imported file.
@@ -29,6 +33,20 @@ pub struct PartNode {
     pub light: Option<Light>,
     /// The camera it carries.
     pub camera: Option<Camera>,
+    /// Index of the skin that bends its mesh. Its mesh then stands in the space of the instance: only the joints
+    /// move it, not the part's own transform (glTF 2.0, section 3.7.3.3).
+    pub skin: Option<u32>,
+    /// Weights of the morph targets of its mesh; `None`: those of the mesh.
+    pub weights: Option<Vec<f32>>,
+}
+
+/// Parts that bend the meshes of other parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Skin {
+    /// Indices of the parts that are joints.
+    pub joints: Vec<u32>,
+    /// From the space of the mesh to that of the joint when nothing is bent, one a joint.
+    pub inverse_bind: Vec<DAffine3>,
 }
 
 /// Where a part stands in its source: names from the root, joined by `/`. The n-th further sibling of
@@ -59,12 +77,24 @@ pub struct PartOverride {
     pub light: Option<Light>,
     /// The camera's values; only where the source has a camera.
     pub camera: Option<Camera>,
+    /// Weights of the morph targets.
+    pub weights: Option<Vec<f32>>,
+    /// Which rays meet it.
+    pub ray_visibility: Option<RayVisibility>,
 }
 
 impl PartOverride {
     /// Whether nothing differs from the prefab.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.local.is_none_or(|local| local.is_finite())
+            && self.light.is_none_or(|light| light.is_finite())
+            && self.camera.is_none_or(|camera| camera.is_finite())
+            && self.weights.iter().flatten().all(|weight| weight.is_finite())
     }
 }
 
@@ -85,9 +115,16 @@ pub struct Prefab {
     pub environment: Option<Environment>,
     /// True: the file could not be read; the prefab stands for it so that nothing is lost on save.
     pub missing: bool,
+    /// Its clips in the order of the file.
+    pub animations: Vec<Arc<Animation>>,
     nodes: Vec<PartNode>,
     subtree_end: Vec<u32>,
     segments: Vec<String>,
+    skins: Vec<Skin>,
+    /// Which skins a part is a joint of.
+    skins_of_joint: BTreeMap<u32, Vec<u32>>,
+    /// Which parts a skin bends.
+    parts_of_skin: BTreeMap<u32, Vec<u32>>,
 }
 
 /// Why a list of parts is not a tree in depth-first order.
@@ -122,7 +159,55 @@ impl Prefab {
         self.subtree_end = subtree_ends(&nodes)?;
         self.segments = path_segments(&nodes);
         self.nodes = nodes;
+        self.index_skins();
         Ok(())
+    }
+
+    /// The skins that parts name.
+    pub fn skins(&self) -> &[Skin] {
+        &self.skins
+    }
+
+    /// Replaces the skins.
+    pub fn set_skins(&mut self, skins: Vec<Skin>) {
+        self.skins = skins;
+        self.index_skins();
+    }
+
+    /// The skin that bends the mesh of a part.
+    pub fn skin_of(&self, part: u32) -> Option<&Skin> {
+        let node = self.node(part)?;
+        node.mesh?;
+        self.skins.get(node.skin? as usize)
+    }
+
+    /// The parts whose meshes are bent by a part.
+    pub(crate) fn bent_by(&self, joint: u32) -> impl Iterator<Item = u32> + '_ {
+        let skins = self.skins_of_joint.get(&joint).into_iter().flatten();
+        skins.filter_map(|skin| self.parts_of_skin.get(skin)).flatten().copied()
+    }
+
+    fn index_skins(&mut self) {
+        (self.skins_of_joint, self.parts_of_skin) = Default::default();
+        for (skin, joint) in
+            self.skins.iter().zip(0..).flat_map(|(s, i)| s.joints.iter().map(move |&j| (i, j)))
+        {
+            let skins = self.skins_of_joint.entry(joint).or_default();
+            // A skin may name a joint twice.
+            if skins.last() != Some(&skin) {
+                skins.push(skin);
+            }
+        }
+        for (part, node) in (0..).zip(&self.nodes) {
+            if let Some(skin) = node.skin {
+                self.parts_of_skin.entry(skin).or_default().push(part);
+            }
+        }
+    }
+
+    /// Whether anything in it can move by itself.
+    pub fn is_animated(&self) -> bool {
+        self.animations.iter().any(|clip| !clip.channels.is_empty())
     }
 
     /// Puts other mesh ids in place.

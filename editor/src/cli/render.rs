@@ -211,7 +211,7 @@ pub(super) fn run(
 }
 
 /// Messages of the validation layer are an error of ours: they are never silent.
-fn report_validation(device: &caustica_renderer::gpu::Device) -> anyhow::Result<()> {
+pub(super) fn report_validation(device: &caustica_renderer::gpu::Device) -> anyhow::Result<()> {
     let messages = device.instance().take_messages();
     match messages.first() {
         Some(first) => {

@@ -1,4 +1,4 @@
-//! Acceleration structures: sizes, build, refit, compaction. Enters: addresses of vertices, indices, instances.
+//! Acceleration structures: sizes, build, refit, compaction. Enters: addresses of vertices, indices, boxes, instances.
 //! Leaves: structures. When to do which is the renderer's business.
 
 use std::sync::Arc;
@@ -83,6 +83,20 @@ pub struct TriangleGeometry {
     pub opaque: bool,
 }
 
+/// One geometry of boxes, whose shapes an intersection shader knows.
+#[derive(Clone, Copy, Debug)]
+pub struct BoxGeometry {
+    /// Address of `count` boxes of six floats (smallest x, y, z, largest x, y, z), [`BOX_STRIDE`] apart, 8-byte aligned.
+    pub boxes: u64,
+    /// Number of boxes.
+    pub count: u32,
+    /// Opaque: any-hit is never called.
+    pub opaque: bool,
+}
+
+/// Bytes from one box to the next, the size of VkAabbPositionsKHR.
+pub const BOX_STRIDE: u64 = 24;
+
 /// Input of a TLAS build.
 #[derive(Clone, Copy, Debug)]
 pub struct TlasInstances {
@@ -97,6 +111,8 @@ pub struct TlasInstances {
 pub enum AccelGeometry<'a> {
     /// A BLAS of triangles.
     Triangles(&'a [TriangleGeometry]),
+    /// A BLAS of boxes.
+    Boxes(&'a [BoxGeometry]),
     /// A TLAS.
     Instances(TlasInstances),
 }
@@ -104,9 +120,9 @@ pub enum AccelGeometry<'a> {
 /// What the structure should be good at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BuildPreference {
-    /// Traced often, built once; may be compacted.
+    /// Traced often, built once. A BLAS may be compacted and never refitted; a TLAS may be refitted.
     FastTrace,
-    /// Rebuilt and refitted often.
+    /// Rebuilt and refitted often; never compacted.
     FastBuild,
 }
 
@@ -130,7 +146,8 @@ pub struct BuildSizes {
     pub refit_scratch: u64,
 }
 
-/// One build or refit, as the recorder takes it.
+/// One build or refit, as the recorder and the background take it.
+#[derive(Clone, Copy)]
 pub struct AccelBuild<'a> {
     /// The structure to fill.
     pub target: &'a AccelStructure,
@@ -138,7 +155,7 @@ pub struct AccelBuild<'a> {
     pub geometry: AccelGeometry<'a>,
     /// Good at what; as given to [`Device::build_sizes`].
     pub preference: BuildPreference,
-    /// Build or refit.
+    /// Build or refit; a BLAS made with [`BuildPreference::FastTrace`] cannot be refitted.
     pub mode: BuildMode,
     /// Address of the scratch memory, aligned to the device's limit.
     pub scratch: u64,
@@ -208,6 +225,21 @@ pub(crate) fn record_builds(device: &Device, command: vk::CommandBuffer, builds:
     unsafe { device.accel_fns.cmd_build_acceleration_structures(command, &infos, &range_slices) };
 }
 
+/// Records the copy of a BLAS into one of its compacted size. The caller has placed barriers.
+pub(crate) fn record_compaction(
+    device: &Device,
+    command: vk::CommandBuffer,
+    from: &AccelStructure,
+    to: &AccelStructure,
+) {
+    let info = vk::CopyAccelerationStructureInfoKHR::default()
+        .src(from.raw)
+        .dst(to.raw)
+        .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
+    // SAFETY: both live until the work has finished; `to` has the size that the device named for `from`.
+    unsafe { device.accel_fns.cmd_copy_acceleration_structure(command, &info) };
+}
+
 /// Packs one instance descriptor (VkAccelerationStructureInstanceKHR). `transform`: three rows of a 3x4 matrix.
 pub fn pack_instance(
     transform: [[f32; 4]; 3],
@@ -241,7 +273,7 @@ fn build_flags(
     use vk::BuildAccelerationStructureFlagsKHR as F;
     match (geometry, preference) {
         (AccelGeometry::Instances(_), BuildPreference::FastTrace) => F::PREFER_FAST_TRACE | F::ALLOW_UPDATE,
-        (AccelGeometry::Triangles(_), BuildPreference::FastTrace) => {
+        (AccelGeometry::Triangles(_) | AccelGeometry::Boxes(_), BuildPreference::FastTrace) => {
             F::PREFER_FAST_TRACE | F::ALLOW_COMPACTION
         }
         (_, BuildPreference::FastBuild) => F::PREFER_FAST_BUILD | F::ALLOW_UPDATE,
@@ -251,34 +283,15 @@ fn build_flags(
 fn primitive_counts(geometry: AccelGeometry<'_>) -> Vec<u32> {
     match geometry {
         AccelGeometry::Triangles(list) => list.iter().map(|g| g.triangle_count).collect(),
+        AccelGeometry::Boxes(list) => list.iter().map(|g| g.count).collect(),
         AccelGeometry::Instances(instances) => vec![instances.count],
     }
 }
 
 fn vulkan_geometries(geometry: AccelGeometry<'_>) -> Vec<vk::AccelerationStructureGeometryKHR<'_>> {
-    let address = |device_address| vk::DeviceOrHostAddressConstKHR { device_address };
     match geometry {
-        AccelGeometry::Triangles(list) => list
-            .iter()
-            .map(|g| {
-                let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
-                    .vertex_format(vk::Format::R32G32B32_SFLOAT)
-                    .vertex_data(address(g.positions))
-                    .vertex_stride(12)
-                    .max_vertex(g.vertex_count.saturating_sub(1))
-                    .index_type(vk::IndexType::UINT32)
-                    .index_data(address(g.indices))
-                    .transform_data(address(g.transform));
-                vk::AccelerationStructureGeometryKHR::default()
-                    .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
-                    .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
-                    .flags(if g.opaque {
-                        vk::GeometryFlagsKHR::OPAQUE
-                    } else {
-                        vk::GeometryFlagsKHR::NO_DUPLICATE_ANY_HIT_INVOCATION
-                    })
-            })
-            .collect(),
+        AccelGeometry::Triangles(list) => list.iter().map(triangles).collect(),
+        AccelGeometry::Boxes(list) => list.iter().map(boxes).collect(),
         AccelGeometry::Instances(instances) => {
             let data = vk::AccelerationStructureGeometryInstancesDataKHR::default()
                 .data(address(instances.descriptors));
@@ -289,4 +302,36 @@ fn vulkan_geometries(geometry: AccelGeometry<'_>) -> Vec<vk::AccelerationStructu
             ]
         }
     }
+}
+
+fn triangles(g: &TriangleGeometry) -> vk::AccelerationStructureGeometryKHR<'static> {
+    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+        .vertex_format(vk::Format::R32G32B32_SFLOAT)
+        .vertex_data(address(g.positions))
+        .vertex_stride(12)
+        .max_vertex(g.vertex_count.saturating_sub(1))
+        .index_type(vk::IndexType::UINT32)
+        .index_data(address(g.indices))
+        .transform_data(address(g.transform));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+        .flags(geometry_flags(g.opaque))
+}
+
+fn boxes(g: &BoxGeometry) -> vk::AccelerationStructureGeometryKHR<'static> {
+    let aabbs =
+        vk::AccelerationStructureGeometryAabbsDataKHR::default().data(address(g.boxes)).stride(BOX_STRIDE);
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::AABBS)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { aabbs })
+        .flags(geometry_flags(g.opaque))
+}
+
+fn geometry_flags(opaque: bool) -> vk::GeometryFlagsKHR {
+    if opaque { vk::GeometryFlagsKHR::OPAQUE } else { vk::GeometryFlagsKHR::NO_DUPLICATE_ANY_HIT_INVOCATION }
+}
+
+fn address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
+    vk::DeviceOrHostAddressConstKHR { device_address }
 }

@@ -64,7 +64,12 @@ impl Buffer {
         if size >= limit {
             return Err(GpuError::Limit { what: format!("buffer '{name}' in bytes"), asked: size, limit });
         }
-        let info = vk::BufferCreateInfo::default().size(size).usage(usage_flags(usage));
+        let families = device.shared_families();
+        let mut info = vk::BufferCreateInfo::default().size(size).usage(usage_flags(usage));
+        // The background builds from and copies between these while the frames trace and read them.
+        if let (Some(families), true) = (&families, usage != BufferUse::BindingTable) {
+            info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
+        }
         // SAFETY: plain creation; destroyed through the retire queue.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.during("vkCreateBuffer")?;
         // SAFETY: `raw` was just made.

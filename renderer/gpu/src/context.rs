@@ -1,4 +1,4 @@
-//! The logical device: features, extension functions, limits, the queue and its timeline semaphore.
+//! The logical device: features, extension functions, limits, the queues and their timeline semaphores.
 //! Enters: an instance and a chosen physical device. Leaves: the `Device` that every other object holds an Arc of.
 
 use std::mem::ManuallyDrop;
@@ -12,7 +12,7 @@ use crate::barrier::Tracker;
 use crate::device_choice::{self, Candidate, DeviceKind, REQUIRED_EXTENSIONS, Requirements};
 use crate::error::{Context, GpuError};
 use crate::instance::Instance;
-use crate::retire::RetireQueue;
+use crate::retire::{Reached, RetireQueue};
 use crate::{Result, memory};
 
 /// How to open a device.
@@ -57,7 +57,7 @@ pub struct Limits {
     pub timestamp_mask: u64,
 }
 
-/// A device with one queue for graphics, compute and transfer.
+/// A device with one queue for graphics, compute and transfer, and one for the background where it has such a family.
 pub struct Device {
     pub(crate) raw: ash::Device,
     pub(crate) accel_fns: khr::acceleration_structure::Device,
@@ -70,6 +70,8 @@ pub struct Device {
     pub(crate) queue: Mutex<vk::Queue>,
     pub(crate) timeline: vk::Semaphore,
     pub(crate) submitted: AtomicU64,
+    pub(crate) async_queue: Option<Mutex<vk::Queue>>,
+    pub(crate) background: BackgroundTimeline,
     pub(crate) retired: RetireQueue,
     pub(crate) tracker: Mutex<Tracker>,
     next_resource: AtomicU64,
@@ -77,6 +79,14 @@ pub struct Device {
     limits: Limits,
     candidate: Candidate,
     instance: Arc<Instance>,
+}
+
+/// The timeline of the background queue, and how far it is known to be.
+pub(crate) struct BackgroundTimeline {
+    pub(crate) semaphore: vk::Semaphore,
+    pub(crate) submitted: AtomicU64,
+    /// The newest value that the host has seen finished: what the frames may use, and wait for on the device.
+    pub(crate) seen: AtomicU64,
 }
 
 impl Device {
@@ -89,12 +99,15 @@ impl Device {
         let raw = create(instance, &candidate)?;
         // SAFETY: the queue family and index 0 were asked for at creation.
         let queue = unsafe { raw.get_device_queue(candidate.queue_family, 0) };
-        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        // SAFETY: likewise; `create` asks for one queue of this family when the candidate has it.
+        let async_queue = candidate.async_family.map(|family| unsafe { raw.get_device_queue(family, 0) });
+        let timeline = create_timeline(&raw)?;
+        let background = BackgroundTimeline {
+            semaphore: create_timeline(&raw)?,
+            submitted: AtomicU64::new(0),
+            seen: AtomicU64::new(0),
+        };
         // SAFETY: plain creation on a live device; destroyed in Drop.
-        let timeline =
-            unsafe { raw.create_semaphore(&vk::SemaphoreCreateInfo::default().push_next(&mut kind), None) }
-                .during("vkCreateSemaphore")?;
-        // SAFETY: as above.
         let pipeline_cache =
             unsafe { raw.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }
                 .during("vkCreatePipelineCache")?;
@@ -111,6 +124,8 @@ impl Device {
             queue: Mutex::new(queue),
             timeline,
             submitted: AtomicU64::new(0),
+            async_queue: async_queue.map(Mutex::new),
+            background,
             retired: RetireQueue::default(),
             tracker: Mutex::new(Tracker::default()),
             next_resource: AtomicU64::new(1),
@@ -160,6 +175,26 @@ impl Device {
         self.candidate.queue_family
     }
 
+    /// Family of the queue that the background submits to.
+    pub(crate) fn background_family(&self) -> u32 {
+        self.candidate.async_family.unwrap_or(self.candidate.queue_family)
+    }
+
+    /// Both families when there are two: buffers are then used by both without a transfer of ownership.
+    pub(crate) fn shared_families(&self) -> Option<[u32; 2]> {
+        self.candidate.async_family.map(|family| [self.candidate.queue_family, family])
+    }
+
+    /// Whether background work runs on a queue of its own, beside the frames; else it takes its turn between them.
+    pub fn has_async_queue(&self) -> bool {
+        self.async_queue.is_some()
+    }
+
+    /// The queue that the background submits to.
+    pub(crate) fn background_queue(&self) -> &Mutex<vk::Queue> {
+        self.async_queue.as_ref().unwrap_or(&self.queue)
+    }
+
     pub(crate) fn cache(&self) -> vk::PipelineCache {
         self.pipeline_cache
     }
@@ -183,7 +218,12 @@ impl Device {
     /// # Errors
     /// [`GpuError::Timeout`] after `seconds`; [`GpuError::DeviceLost`].
     pub fn wait_for(&self, value: u64, seconds: u64) -> Result<()> {
-        let (semaphores, values) = ([self.timeline], [value]);
+        self.wait_on(self.timeline, value, seconds)
+    }
+
+    /// Waits until a timeline of this device has reached `value`.
+    pub(crate) fn wait_on(&self, timeline: vk::Semaphore, value: u64, seconds: u64) -> Result<()> {
+        let (semaphores, values) = ([timeline], [value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the semaphore lives as long as the device.
         match unsafe { self.raw.wait_semaphores(&info, seconds.saturating_mul(1_000_000_000)) } {
@@ -200,10 +240,10 @@ impl Device {
     /// # Errors
     /// When the device is lost.
     pub fn wait_idle(&self) -> Result<()> {
-        let _queue = self.queue.lock();
-        // SAFETY: the queue is locked, so nobody submits meanwhile.
+        let _queues = (self.queue.lock(), self.async_queue.as_ref().map(Mutex::lock));
+        // SAFETY: the queues are locked, so nobody submits meanwhile.
         unsafe { self.raw.device_wait_idle() }.during("vkDeviceWaitIdle")?;
-        self.retired.collect(self, u64::MAX);
+        self.retired.collect(self, Reached::ALL);
         Ok(())
     }
 
@@ -226,7 +266,8 @@ impl Drop for Device {
             if let Err(error) = self.raw.device_wait_idle() {
                 tracing::error!("waiting for the device at the end failed: {error}");
             }
-            self.retired.collect(self, u64::MAX);
+            self.retired.collect(self, Reached::ALL);
+            self.raw.destroy_semaphore(self.background.semaphore, None);
             self.raw.destroy_pipeline_cache(self.pipeline_cache, None);
             self.raw.destroy_semaphore(self.timeline, None);
             ManuallyDrop::drop(&mut self.allocator);
@@ -244,9 +285,12 @@ fn create(instance: &Instance, candidate: &Candidate) -> Result<ash::Device> {
         extensions.push(khr::swapchain::NAME.as_ptr());
     }
     let priorities = [1.0];
-    let queues = [vk::DeviceQueueCreateInfo::default()
-        .queue_family_index(candidate.queue_family)
-        .queue_priorities(&priorities)];
+    let queues: Vec<_> = std::iter::once(candidate.queue_family)
+        .chain(candidate.async_family)
+        .map(|family| {
+            vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)
+        })
+        .collect();
     let (device, _) = device_choice::with_features(true, |features| {
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
@@ -256,6 +300,13 @@ fn create(instance: &Instance, candidate: &Candidate) -> Result<ash::Device> {
         unsafe { instance.raw.create_device(candidate.physical, &info, None) }
     });
     device.during("vkCreateDevice")
+}
+
+fn create_timeline(raw: &ash::Device) -> Result<vk::Semaphore> {
+    let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+    let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+    // SAFETY: plain creation on a live device; destroyed when the device is dropped.
+    unsafe { raw.create_semaphore(&info, None) }.during("vkCreateSemaphore")
 }
 
 fn limits_of(fns: &ash::Instance, physical: vk::PhysicalDevice) -> Limits {

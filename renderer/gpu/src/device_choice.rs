@@ -28,6 +28,8 @@ pub enum DeviceKind {
 pub struct Candidate {
     pub(crate) physical: vk::PhysicalDevice,
     pub(crate) queue_family: u32,
+    /// A family that computes beside the graphics, if the device has one.
+    pub(crate) async_family: Option<u32>,
     /// Position in the driver's list, the INDEX of `--device`.
     pub index: usize,
     /// Name by the driver.
@@ -174,6 +176,7 @@ fn examine(
     Ok(Candidate {
         physical,
         queue_family: queue_family.map_or(0, |(index, _)| index),
+        async_family: async_queue_family(raw, physical),
         timestamp_mask: queue_family.map_or(0, |(_, bits)| u64::MAX >> (64 - bits.clamp(1, 64))),
         index,
         name: properties.device_name_as_c_str().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
@@ -205,6 +208,16 @@ fn universal_queue_family(raw: &ash::Instance, physical: vk::PhysicalDevice) -> 
     let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
     let found = families.iter().position(|f| f.queue_flags.contains(wanted) && f.timestamp_valid_bits > 0)?;
     Some((found as u32, families[found].timestamp_valid_bits))
+}
+
+/// Index of the first family for compute without graphics: its queues run beside the one of the frames.
+fn async_queue_family(raw: &ash::Instance, physical: vk::PhysicalDevice) -> Option<u32> {
+    // SAFETY: a plain query.
+    let families = unsafe { raw.get_physical_device_queue_family_properties(physical) };
+    let beside = |flags: vk::QueueFlags| {
+        flags.contains(vk::QueueFlags::COMPUTE) && !flags.contains(vk::QueueFlags::GRAPHICS)
+    };
+    families.iter().position(|family| beside(family.queue_flags)).map(|index| index as u32)
 }
 
 fn filters_floats(raw: &ash::Instance, physical: vk::PhysicalDevice) -> bool {

@@ -18,7 +18,7 @@ use crate::timers::{PassTime, Timers};
 /// How many frames the host may be ahead of the device.
 const IN_FLIGHT: usize = 2;
 /// After this long without an answer the device counts as hung, seconds.
-const HUNG_AFTER_S: u64 = 300;
+pub(crate) const HUNG_AFTER_S: u64 = 300;
 
 struct Slot {
     pool: vk::CommandPool,
@@ -78,7 +78,7 @@ impl Frames {
         };
         staging.reset();
         timers.reset();
-        device.retired.collect(&device, device.completed()?);
+        device.collect_retired()?;
         // SAFETY: the frame that used the pool has finished.
         unsafe {
             device
@@ -108,6 +108,16 @@ impl Frames {
                 .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS),
         ];
         let mut waits = Vec::new();
+        let background = device.background.seen.load(Ordering::Acquire);
+        if background > 0 {
+            // Signalled already: the wait costs nothing and lets this queue see what the background has written.
+            waits.push(
+                vk::SemaphoreSubmitInfo::default()
+                    .semaphore(device.background.semaphore)
+                    .value(background)
+                    .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS),
+            );
+        }
         if let Some(window) = window {
             waits.push(
                 vk::SemaphoreSubmitInfo::default()
@@ -157,7 +167,7 @@ impl Frames {
         for step in 0..IN_FLIGHT {
             self.finish_slot((self.next + step) % IN_FLIGHT)?;
         }
-        self.device.retired.collect(&self.device, self.device.completed()?);
+        self.device.collect_retired()?;
         Ok(())
     }
 

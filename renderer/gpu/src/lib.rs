@@ -4,6 +4,7 @@
 //! object goes through the device's retire queue, so that it outlives the work that uses it.
 
 mod accel;
+mod background;
 mod barrier;
 mod buffer;
 mod context;
@@ -27,10 +28,11 @@ mod texture_set;
 mod timers;
 
 pub use accel::{
-    AccelBuild, AccelGeometry, AccelStructure, BuildMode, BuildPreference, BuildSizes, TlasInstances,
-    TriangleGeometry, pack_instance,
+    AccelBuild, AccelGeometry, AccelStructure, BOX_STRIDE, BoxGeometry, BuildMode, BuildPreference,
+    BuildSizes, TlasInstances, TriangleGeometry, pack_instance,
 };
 pub use ash;
+pub use background::{Background, BackgroundWork, Ticket};
 pub use barrier::{Access, Barrier, ResourceId, Stage, Tracker};
 pub use buffer::{Buffer, BufferUse, Location};
 pub use context::{Device, DeviceOptions, Limits};

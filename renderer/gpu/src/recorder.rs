@@ -10,7 +10,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::Result;
-use crate::accel::{AccelBuild, record_builds};
+use crate::accel::{AccelBuild, AccelStructure, record_builds, record_compaction};
 use crate::barrier::{Access, Barrier, ResourceId, Stage};
 use crate::buffer::Buffer;
 use crate::context::Device;
@@ -243,6 +243,12 @@ impl Recorder {
     pub fn build(&mut self, builds: &[AccelBuild<'_>], uses: &[Use<'_>]) {
         self.declare(uses);
         record_builds(&self.device, self.command, builds);
+    }
+
+    /// Copies a BLAS into one of its compacted size. `uses`: both, as groups.
+    pub fn compact(&mut self, from: &AccelStructure, to: &AccelStructure, uses: &[Use<'_>]) {
+        self.declare(uses);
+        record_compaction(&self.device, self.command, from, to);
     }
 }
 

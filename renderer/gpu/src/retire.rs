@@ -1,4 +1,5 @@
-//! Objects die here: each dropped object waits for the timeline value of the work that may still use it.
+//! Objects die here: each dropped object waits for the timeline values of the work that may still use it, on the
+//! queue of the frames and on that of the background.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -6,6 +7,7 @@ use std::sync::atomic::Ordering;
 
 use ash::vk;
 
+use crate::Result;
 use crate::barrier::ResourceId;
 use crate::context::Device;
 use crate::memory::Memory;
@@ -26,26 +28,43 @@ pub(crate) enum Garbage {
     Swapchain(vk::SwapchainKHR),
 }
 
-/// What was dropped, in order of the timeline value after which it may be destroyed.
+/// How far each queue must be, or is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reached {
+    pub(crate) frames: u64,
+    pub(crate) background: u64,
+}
+
+impl Reached {
+    /// Both queues are idle.
+    pub(crate) const ALL: Self = Self { frames: u64::MAX, background: u64::MAX };
+
+    fn includes(self, needed: Self) -> bool {
+        needed.frames <= self.frames && needed.background <= self.background
+    }
+}
+
+/// What was dropped, in that order, each with how far both queues must be before it may be destroyed.
 #[derive(Default)]
 pub(crate) struct RetireQueue {
-    waiting: Mutex<VecDeque<(u64, Garbage)>>,
+    waiting: Mutex<VecDeque<(Reached, Garbage)>>,
 }
 
 impl RetireQueue {
-    /// Destroys everything whose value is at most `completed`.
-    pub(crate) fn collect(&self, device: &Device, completed: u64) {
-        loop {
-            let next = {
-                let Ok(mut waiting) = self.waiting.lock() else { return };
-                match waiting.front() {
-                    Some((value, _)) if *value <= completed => waiting.pop_front(),
-                    _ => None,
+    /// Destroys everything that both queues are done with; what waits for a long build does not hold up the rest.
+    /// A structure still goes before the buffer it lies in, which is dropped after it and so never needs less.
+    pub(crate) fn collect(&self, device: &Device, reached: Reached) {
+        let mut free = Vec::new();
+        if let Ok(mut waiting) = self.waiting.lock() {
+            for (needed, garbage) in std::mem::take(&mut *waiting) {
+                if reached.includes(needed) {
+                    free.push(garbage);
+                } else {
+                    waiting.push_back((needed, garbage));
                 }
-            };
-            let Some((_, garbage)) = next else { return };
-            destroy(device, garbage);
+            }
         }
+        free.into_iter().for_each(|garbage| destroy(device, garbage));
     }
 
     /// Number of objects that wait.
@@ -56,12 +75,27 @@ impl RetireQueue {
 
 impl Device {
     /// Takes an object that no new work will use. Work that is being recorded now may use it still: it is destroyed
-    /// once the next submission has finished.
+    /// once the next submission has finished, and what the background was given before.
     pub(crate) fn retire(&self, garbage: Garbage) {
-        let value = self.submitted.load(Ordering::Acquire) + 1;
+        let background = match garbage {
+            // Only these are ever given to the background.
+            Garbage::Buffer(..)
+            | Garbage::AccelStructure(_)
+            | Garbage::CommandPool(_)
+            | Garbage::QueryPool(_) => self.background.submitted.load(Ordering::Acquire),
+            _ => 0,
+        };
+        let needed = Reached { frames: self.submitted.load(Ordering::Acquire) + 1, background };
         if let Ok(mut waiting) = self.retired.waiting.lock() {
-            waiting.push_back((value, garbage));
+            waiting.push_back((needed, garbage));
         }
+    }
+
+    /// Destroys what both queues are done with.
+    pub(crate) fn collect_retired(&self) -> Result<()> {
+        let reached = Reached { frames: self.completed()?, background: self.background_completed()? };
+        self.retired.collect(self, reached);
+        Ok(())
     }
 
     /// Number of dropped objects that wait for the device.

@@ -25,10 +25,24 @@ pub struct AccelStatistics {
     pub blas_built: u64,
     /// BLASes refitted in this frame.
     pub blas_refit: u64,
+    /// BLASes that were built or compacted in the background and came into use in this frame.
+    pub blas_swapped: u64,
+    /// Those of them that were compacted.
+    pub blas_compacted: u64,
+    /// BLASes that are still to be built for the first time: what they hold is not in the picture yet.
+    pub blas_pending: u64,
+    /// BLASes that the background builds or copies now.
+    pub blas_background: u64,
     /// Work on the TLAS in this frame.
     pub tlas: TlasWork,
     /// BLASes built since the start.
     pub total_blas_built: u64,
+    /// BLASes refitted since the start.
+    pub total_blas_refit: u64,
+    /// BLASes swapped since the start.
+    pub total_blas_swapped: u64,
+    /// BLASes compacted since the start.
+    pub total_blas_compacted: u64,
     /// TLAS builds since the start.
     pub total_tlas_built: u64,
     /// TLAS refits since the start.
@@ -52,6 +66,9 @@ impl AccelStatistics {
     /// Adds the work of this frame to the totals.
     pub(crate) fn add_up(&mut self) {
         self.total_blas_built += self.blas_built;
+        self.total_blas_refit += self.blas_refit;
+        self.total_blas_swapped += self.blas_swapped;
+        self.total_blas_compacted += self.blas_compacted;
         match self.tlas {
             TlasWork::Kept => {}
             TlasWork::Refit => self.total_tlas_refit += 1,

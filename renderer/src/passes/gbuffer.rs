@@ -88,7 +88,7 @@ fn draw(
     id: &Image,
     depth: &Image,
 ) -> Result<()> {
-    let batches = scope.tables.draws.batches();
+    let batches: Vec<Batch> = scope.tables.draws.batches().collect();
     let pushes: Vec<Push> = batches.iter().map(|batch| scope.push(batch.key.geometry, 0)).collect();
     let mut solid = Vec::new();
     let mut holes = Vec::new();
@@ -111,7 +111,7 @@ fn draw_of<'a>(scope: &Scope<'a>, batch: &Batch, push: &'a Push) -> Result<Draw<
     let mesh = scope.tables.meshes.get(batch.key.mesh)?;
     let geometry = &mesh.host.geometries[batch.key.geometry as usize];
     Ok(Draw {
-        indices: &mesh.indices,
+        indices: &mesh.vertices.indices,
         first_index: geometry.first_index,
         index_count: geometry.index_count,
         first_instance: batch.first_instance,

@@ -258,7 +258,7 @@ impl DeformingMesh {
                 positions: positions.address(),
                 previous_positions: positions.address(),
                 attributes: attributes.address(),
-                indices: mesh.indices.address() + u64::from(range.first_index) * 4,
+                indices: mesh.vertices.indices.address() + u64::from(range.first_index) * 4,
                 triangle_count: range.index_count / 3,
                 flags: moved_flag(&range.mesh_from_primitive),
                 mesh_from_primitive: rows_of(&range.mesh_from_primitive),

@@ -1,16 +1,20 @@
-//! Draw batches of the raster G-buffer: the same geometry in the same state is one instanced draw.
+//! Draw batches of the raster G-buffer: the same geometry in the same state is one instanced draw. Each batch owns a run
+//! of one table with room to grow, so that an instance comes and goes at its own cost.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use caustica_gpu::{CullMode, Device, Recorder};
 
-use super::instances::Instances;
+use super::instances::{Instances, Slot};
 use super::materials::{Materials, has_alpha, shows_both_sides};
 use super::meshes::Meshes;
-use super::table::Table;
+use super::table::{Download, Table};
 use crate::delta::MeshId;
 use crate::error::Result;
+
+/// Entries of the smallest run.
+const SMALLEST_RUN: u32 = 4;
 
 /// What must be equal for two instances to share a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,87 +36,173 @@ pub(crate) struct Batch {
     pub(crate) instance_count: u32,
 }
 
+/// The instance slots of one batch, and the run of the table that holds them.
+#[derive(Debug, Default)]
+struct List {
+    key: Option<BatchKey>,
+    start: u32,
+    capacity: u32,
+    slots: Vec<u32>,
+}
+
+/// Where a slot stands: number of the list and place in it.
+type Entry = (u32, u32);
+
 /// All batches, and the slots they draw.
 pub(crate) struct Draws {
-    slots: Table<u32>,
-    batches: Vec<Batch>,
-    mirrored: BTreeMap<u32, bool>,
+    table: Table<u32>,
+    by_key: BTreeMap<BatchKey, u32>,
+    lists: Vec<List>,
+    free_lists: Vec<u32>,
+    /// Free runs of the table, by capacity.
+    free_runs: BTreeMap<u32, Vec<u32>>,
+    entries: Vec<Vec<Entry>>,
 }
 
 impl Draws {
     pub(crate) fn new(device: &Arc<Device>) -> Self {
-        Self { slots: Table::new(device, "draw instances"), batches: Vec::new(), mirrored: BTreeMap::new() }
-    }
-
-    /// Sorts every visible instance into its batches.
-    pub(crate) fn rebuild(&mut self, instances: &Instances, materials: &Materials, meshes: &Meshes) {
-        let mut lists: BTreeMap<BatchKey, Vec<u32>> = BTreeMap::new();
-        self.mirrored.clear();
-        for (slot, entry) in instances.iter() {
-            if !entry.instance.visibility.shown || entry.degenerate {
-                continue;
-            }
-            let Ok(mesh) = meshes.get(entry.instance.mesh) else { continue };
-            let mirrored = instances.is_mirrored(slot);
-            self.mirrored.insert(slot, mirrored);
-            for (geometry, id) in entry.instance.materials.iter().enumerate() {
-                let Some(material) = materials.get(*id) else { continue };
-                let turned = mesh.host.geometries[geometry].mesh_from_primitive.matrix3.determinant() < 0.0;
-                let key = BatchKey {
-                    alpha: has_alpha(material),
-                    cull: if shows_both_sides(material) { CullMode::None } else { CullMode::Back },
-                    mirrored: mirrored != turned,
-                    mesh: entry.instance.mesh,
-                    geometry: geometry as u32,
-                };
-                lists.entry(key).or_default().push(slot);
-            }
+        Self {
+            table: Table::new(device, "draw instances"),
+            by_key: BTreeMap::new(),
+            lists: Vec::new(),
+            free_lists: Vec::new(),
+            free_runs: BTreeMap::new(),
+            entries: Vec::new(),
         }
-        let mut slots = Vec::new();
-        self.batches = lists
-            .into_iter()
-            .map(|(key, list)| {
-                let first_instance = slots.len() as u32;
-                slots.extend_from_slice(&list);
-                Batch { key, first_instance, instance_count: list.len() as u32 }
-            })
-            .collect();
-        self.slots.replace(slots);
     }
 
-    /// After transforms changed: a mirrored or degenerate state that flipped moves the instance to another batch.
-    pub(crate) fn follow_mirrored(
+    /// Sorts one slot into the batches that it belongs to now; a free, hidden or degenerate one into none.
+    pub(crate) fn follow(
         &mut self,
-        moved: &[u32],
+        slot: u32,
         instances: &Instances,
         materials: &Materials,
         meshes: &Meshes,
     ) {
-        let flipped = moved.iter().any(|slot| {
-            let now = instances
-                .get(*slot)
-                .filter(|entry| entry.instance.visibility.shown && !entry.degenerate)
-                .map(|_| instances.is_mirrored(*slot));
-            now != self.mirrored.get(slot).copied()
-        });
-        if flipped {
-            self.rebuild(instances, materials, meshes);
+        self.take_out(slot);
+        let Some(entry) = instances.get(slot).filter(|entry| is_drawn(entry)) else { return };
+        let Ok(mesh) = meshes.get(entry.instance.mesh) else { return };
+        let mirrored = instances.is_mirrored(slot);
+        for (geometry, id) in entry.instance.materials.iter().enumerate() {
+            let Some(material) = materials.get(*id) else { continue };
+            let turned = mesh.host.geometries[geometry].mesh_from_primitive.matrix3.determinant() < 0.0;
+            let key = BatchKey {
+                alpha: has_alpha(material),
+                cull: if shows_both_sides(material) { CullMode::None } else { CullMode::Back },
+                mirrored: mirrored != turned,
+                mesh: entry.instance.mesh,
+                geometry: geometry as u32,
+            };
+            self.put_in(slot, key);
         }
     }
 
-    pub(crate) fn batches(&self) -> &[Batch] {
-        &self.batches
+    fn put_in(&mut self, slot: u32, key: BatchKey) {
+        let number = match self.by_key.get(&key) {
+            Some(number) => *number,
+            None => {
+                let number = self.free_lists.pop().unwrap_or_else(|| {
+                    self.lists.push(List::default());
+                    self.lists.len() as u32 - 1
+                });
+                self.lists[number as usize].key = Some(key);
+                self.by_key.insert(key, number);
+                number
+            }
+        };
+        let place = self.lists[number as usize].slots.len() as u32;
+        if place == self.lists[number as usize].capacity {
+            self.grow(number);
+        }
+        let list = &mut self.lists[number as usize];
+        list.slots.push(slot);
+        self.table.set((list.start + place) as usize, slot);
+        if self.entries.len() <= slot as usize {
+            self.entries.resize_with(slot as usize + 1, Vec::new);
+        }
+        self.entries[slot as usize].push((number, place));
+    }
+
+    /// Moves a list to a run twice as long.
+    fn grow(&mut self, number: u32) {
+        let list = &mut self.lists[number as usize];
+        let (old_start, old_capacity) = (list.start, list.capacity);
+        list.capacity = (list.capacity * 2).max(SMALLEST_RUN);
+        let free = self.free_runs.get_mut(&list.capacity).and_then(Vec::pop);
+        list.start = free.unwrap_or(self.table.len() as u32);
+        // The last entry first: the table then grows once.
+        self.table.set((list.start + list.capacity) as usize - 1, 0);
+        for (place, slot) in list.slots.iter().enumerate() {
+            self.table.set(list.start as usize + place, *slot);
+        }
+        if old_capacity > 0 {
+            self.free_runs.entry(old_capacity).or_default().push(old_start);
+        }
+    }
+
+    fn take_out(&mut self, slot: u32) {
+        let Some(entries) = self.entries.get_mut(slot as usize) else { return };
+        for (number, place) in std::mem::take(entries) {
+            let list = &mut self.lists[number as usize];
+            list.slots.swap_remove(place as usize);
+            if let Some(moved) = list.slots.get(place as usize).copied() {
+                let from = list.slots.len() as u32;
+                self.table.set((list.start + place) as usize, moved);
+                for entry in &mut self.entries[moved as usize] {
+                    if *entry == (number, from) {
+                        entry.1 = place;
+                    }
+                }
+            }
+            if list.slots.is_empty() {
+                let List { key, start, capacity, .. } = std::mem::take(list);
+                self.free_runs.entry(capacity).or_default().push(start);
+                self.free_lists.push(number);
+                if let Some(key) = key {
+                    self.by_key.remove(&key);
+                }
+            }
+        }
+    }
+
+    /// Forgets every run once nothing is drawn, so that a scene loaded afresh lies as in a new renderer.
+    pub(crate) fn tidy(&mut self) {
+        if self.by_key.is_empty() {
+            self.table.clear();
+            self.lists.clear();
+            self.free_lists.clear();
+            self.free_runs.clear();
+            self.entries.clear();
+        }
+    }
+
+    /// All batches in the order in which they are drawn.
+    pub(crate) fn batches(&self) -> impl Iterator<Item = Batch> {
+        self.by_key.iter().map(|(key, number)| {
+            let list = &self.lists[*number as usize];
+            Batch { key: *key, first_instance: list.start, instance_count: list.slots.len() as u32 }
+        })
     }
 
     pub(crate) fn address(&self) -> u64 {
-        self.slots.address()
+        self.table.address()
+    }
+
+    /// Records the copy of the table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.table.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {
-        self.slots.is_dirty()
+        self.table.is_dirty()
     }
 
     pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
-        self.slots.flush(recorder)
+        self.table.flush(recorder)
     }
+}
+
+fn is_drawn(entry: &Slot) -> bool {
+    let visibility = entry.instance.visibility;
+    visibility.shown && visibility.to_camera && !entry.degenerate
 }

@@ -1,25 +1,30 @@
 //! Triangles that emit, with an alias table by area times luminance. They are named by (instance, geometry,
 //! primitive), so that moving one uploads nothing unless its share of the power changes.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use caustica_gpu::{Device, Recorder};
-use glam::Vec3;
+use glam::{Affine3A, Mat3, Vec3};
 
 use super::alias;
-use super::instances::Instances;
+use super::instances::{Instances, Slot};
 use super::materials::{Materials, emits};
 use super::meshes::Meshes;
-use super::table::Table;
+use super::table::{Download, Table};
 use crate::error::Result;
 use crate::gpu_types::{AliasEntry, EmissiveTriangle};
+
+/// Areas that change by less than this share leave the table as it is: the shader divides by the true area.
+const AREA_TOLERANCE: f32 = 1e-5;
 
 /// All emissive triangles.
 pub(crate) struct Emissive {
     triangles: Table<EmissiveTriangle>,
     alias: Table<AliasEntry>,
-    instances: BTreeSet<u32>,
+    /// Emitters by slot, with the metric of their transform when the table was made.
+    emitters: BTreeMap<u32, Mat3>,
+    stale: bool,
 }
 
 impl Emissive {
@@ -27,63 +32,57 @@ impl Emissive {
         Self {
             triangles: Table::new(device, "emissive triangles"),
             alias: Table::new(device, "emissive alias table"),
-            instances: BTreeSet::new(),
+            emitters: BTreeMap::new(),
+            stale: false,
         }
     }
 
-    /// Collects every emissive triangle of the visible instances.
-    pub(crate) fn rebuild(&mut self, instances: &Instances, materials: &Materials, meshes: &Meshes) {
+    /// A slot is new, free, or of another mesh, material or visibility.
+    pub(crate) fn follow(&mut self, slot: u32, instances: &Instances, materials: &Materials) {
+        let was = self.emitters.remove(&slot).is_some();
+        let now = instances.get(slot).filter(|entry| is_emitter(entry, materials));
+        if let Some(entry) = now {
+            self.emitters.insert(slot, metric(&entry.instance.render_from_mesh));
+        }
+        self.stale |= was || now.is_some();
+    }
+
+    /// A transform changed: areas and so probabilities may have. A turn or a shift changes neither.
+    pub(crate) fn follow_transform(&mut self, slot: u32, instances: &Instances) {
+        let Some(old) = self.emitters.get_mut(&slot) else { return };
+        let Some(entry) = instances.get(slot) else { return };
+        let now = metric(&entry.instance.render_from_mesh);
+        let size = old.x_axis.x.abs().max(old.y_axis.y.abs()).max(old.z_axis.z.abs());
+        let differs = (now - *old).to_cols_array().iter().any(|d| !(d.abs() <= AREA_TOLERANCE * size));
+        if differs {
+            *old = now;
+            self.stale = true;
+        }
+    }
+
+    /// What emitters emit, or their vertices, changed.
+    pub(crate) fn mark_stale(&mut self) {
+        self.stale |= !self.emitters.is_empty();
+    }
+
+    /// Whether any of the emitters places this mesh.
+    pub(crate) fn places(&self, mesh: crate::delta::MeshId, instances: &Instances) -> bool {
+        self.emitters.keys().any(|slot| instances.get(*slot).is_some_and(|entry| entry.instance.mesh == mesh))
+    }
+
+    /// Collects every emissive triangle anew if that is needed.
+    pub(crate) fn update(&mut self, instances: &Instances, materials: &Materials, meshes: &Meshes) {
+        if !std::mem::take(&mut self.stale) {
+            return;
+        }
         let (mut triangles, mut weights) = (Vec::new(), Vec::new());
-        self.instances.clear();
-        for (slot, entry) in instances.iter() {
-            let emitter = entry.instance.materials.iter().any(|id| materials.get(*id).is_some_and(emits));
-            if !emitter || !entry.instance.visibility.shown {
-                continue;
-            }
+        for slot in self.emitters.keys() {
             // A degenerate emitter is followed too: it may get a size again.
-            self.instances.insert(slot);
-            if entry.degenerate {
-                continue;
-            }
-            for (geometry, id) in entry.instance.materials.iter().enumerate() {
-                let Some(material) = materials.get(*id).filter(|material| emits(material)) else { continue };
-                let Ok(mesh) = meshes.get(entry.instance.mesh) else { continue };
-                let luminance = f64::from(material.emissive.dot(Vec3::new(0.2126, 0.7152, 0.0722)));
-                let place =
-                    entry.instance.render_from_mesh * mesh.host.geometries[geometry].mesh_from_primitive;
-                let range = &mesh.host.geometries[geometry];
-                let indices = &mesh.host.indices[range.first_index as usize..][..range.index_count as usize];
-                for (primitive, corner) in indices.chunks_exact(3).enumerate() {
-                    let [a, b, c] = [0, 1, 2]
-                        .map(|i| place.transform_point3(mesh.host.positions[corner[i] as usize]).as_dvec3());
-                    let area = (b - a).cross(c - a).length() * 0.5;
-                    if area > 0.0 && area.is_finite() {
-                        triangles.push(EmissiveTriangle {
-                            instance: slot,
-                            geometry: geometry as u32,
-                            primitive: primitive as u32,
-                            pad0: 0,
-                        });
-                        weights.push(area * luminance);
-                    }
-                }
-            }
+            let Some(entry) = instances.get(*slot).filter(|entry| !entry.degenerate) else { continue };
+            collect(*slot, entry, materials, meshes, &mut triangles, &mut weights);
         }
         self.triangles.replace(triangles);
         self.alias.replace(alias::build(&weights));
-    }
-
-    /// After transforms changed: areas and so probabilities may have.
-    pub(crate) fn follow_transforms(
-        &mut self,
-        moved: &[u32],
-        instances: &Instances,
-        materials: &Materials,
-        meshes: &Meshes,
-    ) {
-        if moved.iter().any(|slot| self.instances.contains(slot)) {
-            self.rebuild(instances, materials, meshes);
-        }
     }
 
     pub(crate) fn len(&self) -> u32 {
@@ -98,6 +97,11 @@ impl Emissive {
         self.alias.address()
     }
 
+    /// Records the copies of triangles and alias table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<(Download, Download)> {
+        Ok((self.triangles.download(recorder)?, self.alias.download(recorder)?))
+    }
+
     pub(crate) fn is_dirty(&self) -> bool {
         self.triangles.is_dirty() || self.alias.is_dirty()
     }
@@ -105,5 +109,44 @@ impl Emissive {
     pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
         self.triangles.flush(recorder)?;
         self.alias.flush(recorder)
+    }
+}
+
+/// Lengths and angles that the map makes: equal ones give equal areas.
+fn metric(map: &Affine3A) -> Mat3 {
+    let linear = Mat3::from(map.matrix3);
+    linear.transpose() * linear
+}
+
+fn is_emitter(entry: &Slot, materials: &Materials) -> bool {
+    let shines = entry.instance.materials.iter().any(|id| materials.get(*id).is_some_and(emits));
+    shines && entry.instance.visibility.shown
+}
+
+fn collect(
+    slot: u32,
+    entry: &Slot,
+    materials: &Materials,
+    meshes: &Meshes,
+    triangles: &mut Vec<EmissiveTriangle>,
+    weights: &mut Vec<f64>,
+) {
+    let Ok(mesh) = meshes.get(entry.instance.mesh) else { return };
+    for (geometry, id) in entry.instance.materials.iter().enumerate() {
+        let Some(material) = materials.get(*id).filter(|material| emits(material)) else { continue };
+        let luminance = f64::from(material.emissive.dot(Vec3::new(0.2126, 0.7152, 0.0722)));
+        let range = &mesh.host.geometries[geometry];
+        let place = entry.instance.render_from_mesh * range.mesh_from_primitive;
+        let indices = &mesh.host.indices[range.first_index as usize..][..range.index_count as usize];
+        for (primitive, corner) in indices.chunks_exact(3).enumerate() {
+            let [a, b, c] =
+                [0, 1, 2].map(|i| place.transform_point3(mesh.host.positions[corner[i] as usize]).as_dvec3());
+            let area = (b - a).cross(c - a).length() * 0.5;
+            if area > 0.0 && area.is_finite() {
+                let (geometry, primitive) = (geometry as u32, primitive as u32);
+                triangles.push(EmissiveTriangle { instance: slot, geometry, primitive, pad0: 0 });
+                weights.push(area * luminance);
+            }
+        }
     }
 }

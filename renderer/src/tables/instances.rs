@@ -8,8 +8,8 @@ use glam::{Affine3A, Mat3A, Vec3A};
 
 use super::materials::Materials;
 use super::meshes::{Meshes, rows_of};
-use super::table::Table;
-use crate::delta::{Instance, InstanceId, MaterialId, MeshId};
+use super::table::{Download, Table};
+use crate::delta::{Instance, InstanceId, MaterialId, Visibility};
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{self, INSTANCE_MIRRORED, Rows};
 
@@ -33,6 +33,8 @@ pub(crate) struct Instances {
     /// Free ranges of material slots, by their length.
     free_ranges: BTreeMap<u32, Vec<u32>>,
     moved_last_frame: BTreeSet<u32>,
+    /// How many (instance, geometry) pairs have a material.
+    uses: BTreeMap<MaterialId, u32>,
 }
 
 impl Instances {
@@ -45,17 +47,18 @@ impl Instances {
             free_slots: Vec::new(),
             free_ranges: BTreeMap::new(),
             moved_last_frame: BTreeSet::new(),
+            uses: BTreeMap::new(),
         }
     }
 
-    /// Adds an instance, or changes it.
+    /// Adds an instance, or changes it. Returns its slot.
     pub(crate) fn set(
         &mut self,
         id: InstanceId,
         instance: &Instance,
         meshes: &Meshes,
         materials: &Materials,
-    ) -> Result<()> {
+    ) -> Result<u32> {
         let mesh = meshes.get(instance.mesh)?;
         let count = mesh.geometry_count();
         if instance.materials.len() != count as usize {
@@ -76,11 +79,18 @@ impl Instances {
         if slot as usize >= self.slots.len() {
             self.slots.resize_with(slot as usize + 1, || None);
         }
+        for id in &instance.materials {
+            *self.uses.entry(*id).or_default() += 1;
+        }
         let material_base = match old {
-            Some(old) if old.geometry_count == count => old.material_base,
             Some(old) => {
-                self.free_range(old.material_base, old.geometry_count);
-                self.take_range(count)
+                self.release(&old.instance.materials);
+                if old.geometry_count == count {
+                    old.material_base
+                } else {
+                    self.free_range(old.material_base, old.geometry_count);
+                    self.take_range(count)
+                }
             }
             None => self.take_range(count),
         };
@@ -105,51 +115,84 @@ impl Instances {
         self.by_id.insert(id, slot);
         self.slots[slot as usize] =
             Some(Slot { id, instance: instance.clone(), degenerate, material_base, geometry_count: count });
-        Ok(())
+        Ok(slot)
     }
 
-    /// Moves an instance. Returns its slot; `None` when only its degenerate state hides it as before.
+    /// Moves an instance. Returns its slot, and whether it is drawn differently: mirrored or degenerate, or no longer.
     ///
     /// # Errors
     /// When the id is not in the table.
-    pub(crate) fn set_transform(&mut self, id: InstanceId, transform: Affine3A) -> Result<Option<u32>> {
-        let unknown = || RendererError::Unknown { what: "instance", id: format!("{}/{}", id.node, id.part) };
-        let slot = *self.by_id.get(&id).ok_or_else(unknown)?;
-        let entry = self.slots[slot as usize].as_mut().ok_or_else(unknown)?;
-        let mut record = *self.table.get(slot as usize).ok_or_else(unknown)?;
+    pub(crate) fn set_transform(&mut self, id: InstanceId, transform: Affine3A) -> Result<(u32, bool)> {
+        let (slot, entry) = self.entry_mut(id)?;
+        let was_degenerate = std::mem::replace(&mut entry.degenerate, is_degenerate(&transform));
+        let degenerate = entry.degenerate;
         entry.instance.render_from_mesh = transform;
-        entry.degenerate = is_degenerate(&transform);
-        let previous = record.render_from_mesh;
+        let mut record = self.table.get(slot as usize).copied().unwrap_or(bytemuck::Zeroable::zeroed());
+        let (previous, old_flags) = (record.render_from_mesh, record.flags);
         place(&mut record, &transform, Some(previous));
         self.table.set(slot as usize, record);
         self.moved_last_frame.insert(slot);
-        Ok(Some(slot))
+        Ok((slot, record.flags != old_flags || degenerate != was_degenerate))
     }
 
-    pub(crate) fn remove(&mut self, id: InstanceId) {
-        let Some(slot) = self.by_id.remove(&id) else { return };
+    /// Changes who sees an instance. Returns its slot.
+    ///
+    /// # Errors
+    /// When the id is not in the table.
+    pub(crate) fn set_visibility(&mut self, id: InstanceId, visibility: Visibility) -> Result<u32> {
+        let (slot, entry) = self.entry_mut(id)?;
+        entry.instance.visibility = visibility;
+        Ok(slot)
+    }
+
+    fn entry_mut(&mut self, id: InstanceId) -> Result<(u32, &mut Slot)> {
+        let unknown = || RendererError::Unknown { what: "instance", id: format!("{}/{}", id.node, id.part) };
+        let slot = *self.by_id.get(&id).ok_or_else(unknown)?;
+        let entry = self.slots.get_mut(slot as usize).and_then(Option::as_mut).ok_or_else(unknown)?;
+        Ok((slot, entry))
+    }
+
+    /// Takes an instance out. Returns the slot that it leaves.
+    pub(crate) fn remove(&mut self, id: InstanceId) -> Option<u32> {
+        let slot = self.by_id.remove(&id)?;
         if let Some(old) = self.slots[slot as usize].take() {
             self.free_range(old.material_base, old.geometry_count);
+            self.release(&old.instance.materials);
         }
         self.table.set(slot as usize, bytemuck::Zeroable::zeroed());
         self.moved_last_frame.remove(&slot);
         self.free_slots.push(slot);
+        Some(slot)
     }
 
-    /// Points the instances of changed meshes at the new records.
-    pub(crate) fn follow_meshes(&mut self, changed: &[MeshId], meshes: &Meshes) -> Result<()> {
-        let changed: BTreeSet<MeshId> = changed.iter().copied().collect();
-        for (slot, entry) in self.slots.iter().enumerate() {
-            let Some(entry) = entry.as_ref().filter(|entry| changed.contains(&entry.instance.mesh)) else {
-                continue;
-            };
-            let address = meshes.get(entry.instance.mesh)?.geometries_address();
-            if let Some(record) = self.table.get(slot).copied().filter(|record| record.geometries != address)
-            {
-                self.table.set(slot, gpu_types::Instance { geometries: address, ..record });
+    /// Forgets every slot once no instance is left, so that a scene loaded afresh lies as in a new renderer.
+    pub(crate) fn tidy(&mut self) {
+        if self.by_id.is_empty() {
+            self.table.clear();
+            self.material_slots.clear();
+            self.slots.clear();
+            self.free_slots.clear();
+            self.free_ranges.clear();
+        }
+    }
+
+    fn release(&mut self, materials: &[MaterialId]) {
+        for id in materials {
+            if let Some(count) = self.uses.get_mut(id) {
+                *count -= 1;
+                if *count == 0 {
+                    self.uses.remove(id);
+                }
             }
         }
-        Ok(())
+    }
+
+    /// Points an instance at its geometry records.
+    pub(crate) fn set_geometries(&mut self, slot: u32, geometries: u64) {
+        let record = self.table.get(slot as usize).copied();
+        if let Some(record) = record.filter(|record| record.geometries != geometries) {
+            self.table.set(slot as usize, gpu_types::Instance { geometries, ..record });
+        }
     }
 
     /// A frame has gone by: what moved in it stands still until it moves again.
@@ -175,9 +218,14 @@ impl Instances {
         self.by_id.get(&id).copied()
     }
 
-    /// Every material in use, with repetitions.
+    /// Every material in use, once.
     pub(crate) fn materials_in_use(&self) -> impl Iterator<Item = MaterialId> {
-        self.iter().flat_map(|(_, slot)| slot.instance.materials.iter().copied())
+        self.uses.keys().copied()
+    }
+
+    /// Where an instance was in the last frame.
+    pub(crate) fn previous_transform(&self, slot: u32) -> Option<&Rows> {
+        self.table.get(slot as usize).map(|record| &record.previous_render_from_mesh)
     }
 
     pub(crate) fn is_mirrored(&self, slot: u32) -> bool {
@@ -200,6 +248,16 @@ impl Instances {
 
     pub(crate) fn material_slots_address(&self) -> u64 {
         self.material_slots.address()
+    }
+
+    /// Records the copy of the table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.table.download(recorder)
+    }
+
+    /// Records the copy of the material slots back to the host.
+    pub(crate) fn download_material_slots(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.material_slots.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {

@@ -7,7 +7,7 @@ use caustica_gpu::{Device, Recorder};
 use glam::Vec3;
 
 use super::alias;
-use super::table::Table;
+use super::table::{Download, Table};
 use crate::delta::{Light, LightId, SceneDelta};
 use crate::error::Result;
 use crate::gpu_types::{self, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT};
@@ -66,6 +66,11 @@ impl Lights {
 
     pub(crate) fn alias_address(&self) -> u64 {
         self.alias.address()
+    }
+
+    /// Records the copy of the table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.table.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {

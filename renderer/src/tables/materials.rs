@@ -6,7 +6,7 @@ use std::sync::Arc;
 use caustica_gpu::{Device, Recorder};
 use glam::Vec3;
 
-use super::table::Table;
+use super::table::{Download, Table};
 use super::textures::Textures;
 use crate::delta::{self, AlphaMode, MaterialId, ShadingMode};
 use crate::error::{RendererError, Result};
@@ -37,21 +37,22 @@ impl Materials {
         self.by_id.get(&id).map(|(_, material)| material)
     }
 
-    /// Sets a material; true when whether rays may pass through it, or how its faces are culled, has changed.
-    pub(crate) fn set(&mut self, id: MaterialId, material: &delta::Material, textures: &Textures) -> bool {
+    /// Sets a material; says what follows for the instances that have it.
+    pub(crate) fn set(
+        &mut self,
+        id: MaterialId,
+        material: &delta::Material,
+        textures: &Textures,
+    ) -> MaterialChange {
         let old = self.by_id.get(&id);
-        let flipped = old.is_some_and(|(_, old)| {
-            is_opaque(old) != is_opaque(material)
-                || shows_both_sides(old) != shows_both_sides(material)
-                || has_alpha(old) != has_alpha(material)
-        });
+        let change = old.map_or(MaterialChange::Values, |(_, old)| change_between(old, material));
         let index = match old {
             Some((index, _)) => *index,
             None => self.free.pop().unwrap_or(self.table.len() as u32),
         };
         self.table.set(index as usize, pack(material, textures));
         self.by_id.insert(id, (index, material.clone()));
-        flipped
+        change
     }
 
     pub(crate) fn remove(&mut self, id: MaterialId) {
@@ -60,8 +61,23 @@ impl Materials {
         }
     }
 
+    /// Every material with its index.
+    pub(crate) fn ids(&self) -> impl Iterator<Item = (MaterialId, u32)> {
+        self.by_id.iter().map(|(id, (index, _))| (*id, *index))
+    }
+
+    /// The material at an index.
+    pub(crate) fn id_of(&self, index: u32) -> Option<MaterialId> {
+        self.ids().find(|(_, other)| *other == index).map(|(id, _)| id)
+    }
+
     pub(crate) fn address(&self) -> u64 {
         self.table.address()
+    }
+
+    /// Records the copy of the table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.table.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {
@@ -70,6 +86,29 @@ impl Materials {
 
     pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
         self.table.flush(recorder)
+    }
+}
+
+/// What a new version of a material means for the instances that have it, from little to much.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum MaterialChange {
+    /// The table alone.
+    Values,
+    /// Its emitters shine differently.
+    Emission,
+    /// Rays pass where they did not, faces are culled differently, or it began or ended to shine: the instances belong
+    /// elsewhere.
+    Kind,
+}
+
+fn change_between(old: &delta::Material, new: &delta::Material) -> MaterialChange {
+    let kind = |m: &delta::Material| (is_opaque(m), shows_both_sides(m), has_alpha(m), emits(m));
+    if kind(old) != kind(new) {
+        MaterialChange::Kind
+    } else if old.emissive != new.emissive {
+        MaterialChange::Emission
+    } else {
+        MaterialChange::Values
     }
 }
 

@@ -1,6 +1,6 @@
 //! Meshes on the device: vertices and indices in device-local memory, one geometry record a primitive.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use caustica_gpu::{Buffer, BufferUse, Device, Location, MemoryUse, Recorder, ResourceId};
@@ -8,24 +8,33 @@ use glam::{Affine3A, Vec3};
 
 use super::deformation::DeformationBuffers;
 use super::spatial_order::sort_triangles;
-use crate::delta::{Mesh, MeshId};
+use crate::delta::{self, Mesh, MeshId};
 use crate::error::{RendererError, Result};
-use crate::gpu_types::{self, GEOMETRY_MOVED, Rows, VertexAttributes};
+use crate::gpu_types::{self, GEOMETRY_MOVED, GEOMETRY_MOVING, Rows, VertexAttributes};
 
 /// Offset of `mesh_from_primitive` inside a geometry record; acceleration structure builds read it there.
 pub(super) const TRANSFORM_OFFSET: u64 =
     std::mem::offset_of!(gpu_types::Geometry, mesh_from_primitive) as u64;
 
-/// One mesh on the device.
-pub(crate) struct GpuMesh {
-    positions: Buffer,
+/// Vertices and indices; a build in the background holds them until it has finished.
+pub(crate) struct Vertices {
+    pub(crate) positions: Buffer,
     attributes: Buffer,
     pub(crate) indices: Buffer,
-    geometries: Buffer,
+}
+
+/// One mesh on the device.
+pub(crate) struct GpuMesh {
+    pub(crate) vertices: Arc<Vertices>,
+    /// Geometry records, as on the device.
+    records: Vec<gpu_types::Geometry>,
+    pub(crate) geometries: Buffer,
     /// How it deforms; `None`: rigid.
     pub(super) deformation: Option<Arc<DeformationBuffers>>,
     /// The content, for emissive triangles and statistics.
     pub(crate) host: Arc<Mesh>,
+    /// Bounds of each primitive, primitive space.
+    bounds: Vec<(Vec3, Vec3)>,
     /// Middle of its bounds, mesh space.
     pub(crate) centre: Vec3,
 }
@@ -38,17 +47,17 @@ impl GpuMesh {
 
     /// Address of the positions: of a mesh that deforms, at rest.
     pub(super) fn positions_address(&self) -> u64 {
-        self.positions.address()
+        self.vertices.positions.address()
     }
 
     /// Address of the vertex attributes: of a mesh that deforms, at rest.
     pub(super) fn attributes_address(&self) -> u64 {
-        self.attributes.address()
+        self.vertices.attributes.address()
     }
 
     /// A number that no other content of this or another mesh has had.
     pub(super) fn content(&self) -> ResourceId {
-        self.positions.id()
+        self.vertices.positions.id()
     }
 
     /// Number of primitives.
@@ -56,19 +65,27 @@ impl GpuMesh {
         self.host.geometries.len() as u32
     }
 
+    /// Number of triangles of all primitives.
+    pub(crate) fn triangle_count(&self) -> u64 {
+        self.records.iter().map(|record| u64::from(record.triangle_count)).sum()
+    }
+
     /// Input of a BLAS build for geometry `index`.
     pub(crate) fn triangles(&self, index: usize, opaque: bool) -> caustica_gpu::TriangleGeometry {
         let geometry = &self.host.geometries[index];
         caustica_gpu::TriangleGeometry {
-            positions: self.positions.address(),
+            positions: self.vertices.positions.address(),
             vertex_count: self.host.positions.len() as u32,
-            indices: self.indices.address() + u64::from(geometry.first_index) * 4,
+            indices: self.vertices.indices.address() + u64::from(geometry.first_index) * 4,
             triangle_count: geometry.index_count / 3,
-            transform: self.geometries.address()
-                + index as u64 * size_of::<gpu_types::Geometry>() as u64
-                + TRANSFORM_OFFSET,
+            transform: self.geometries.address() + record_offset(index) + TRANSFORM_OFFSET,
             opaque,
         }
+    }
+
+    /// Bounds of primitive `index` where it stands now, mesh space.
+    pub(crate) fn placed_bounds(&self, index: usize) -> (Vec3, Vec3) {
+        placed(self.bounds[index], &self.host.geometries[index].mesh_from_primitive)
     }
 }
 
@@ -76,81 +93,156 @@ impl GpuMesh {
 pub(crate) struct Meshes {
     device: Arc<Device>,
     by_id: BTreeMap<MeshId, GpuMesh>,
+    triangle_count: u64,
+    /// Primitives that moved in the last frame.
+    moved_last_frame: BTreeSet<(MeshId, u32)>,
+    /// Records that differ from those on the device.
+    dirty: BTreeSet<(MeshId, u32)>,
 }
 
 impl Meshes {
     pub(crate) fn new(device: &Arc<Device>) -> Self {
-        Self { device: Arc::clone(device), by_id: BTreeMap::new() }
+        Self {
+            device: Arc::clone(device),
+            by_id: BTreeMap::new(),
+            triangle_count: 0,
+            moved_last_frame: BTreeSet::new(),
+            dirty: BTreeSet::new(),
+        }
     }
 
     pub(crate) fn get(&self, id: MeshId) -> Result<&GpuMesh> {
         self.by_id.get(&id).ok_or_else(|| RendererError::Unknown { what: "mesh", id: id.0.to_string() })
     }
 
-    /// Uploads a mesh, or its new content.
-    pub(crate) fn set(&mut self, recorder: &mut Recorder, id: MeshId, mesh: &Arc<Mesh>) -> Result<()> {
+    /// All meshes in order of id.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (MeshId, &GpuMesh)> {
+        self.by_id.iter().map(|(id, mesh)| (*id, mesh))
+    }
+
+    /// Uploads a mesh, or its new content. True: it took another's place.
+    pub(crate) fn set(&mut self, recorder: &mut Recorder, id: MeshId, mesh: &Arc<Mesh>) -> Result<bool> {
         check(mesh, &self.device)?;
         let deformation = DeformationBuffers::new(&self.device, recorder, mesh)?.map(Arc::new);
-        let mesh = &Arc::new(in_spatial_order(mesh));
+        let mesh = Arc::new(in_spatial_order(mesh));
         let make = |what: &str, size: usize| {
             let name = format!("{} {what}", mesh.name);
-            Buffer::new(
-                &self.device,
-                &name,
-                size as u64,
-                BufferUse::Geometry,
-                Location::Device,
-                MemoryUse::Geometry,
-            )
+            let (usage, kind) = (BufferUse::Geometry, MemoryUse::Geometry);
+            Buffer::new(&self.device, &name, size as u64, usage, Location::Device, kind)
         };
-        let attributes = attributes_of(mesh);
-        let positions = make("positions", mesh.positions.len() * 12)?;
-        let attribute_buffer = make("attributes", size_of_val(attributes.as_slice()))?;
-        let indices = make("indices", mesh.indices.len() * 4)?;
-        recorder.upload(&positions, 0, bytemuck::cast_slice(&mesh.positions))?;
-        recorder.upload(&attribute_buffer, 0, bytemuck::cast_slice(&attributes))?;
-        recorder.upload(&indices, 0, bytemuck::cast_slice(&mesh.indices))?;
-        let records: Vec<_> = mesh
-            .geometries
-            .iter()
-            .map(|geometry| gpu_types::Geometry {
-                positions: positions.address(),
-                previous_positions: positions.address(),
-                attributes: attribute_buffer.address(),
-                indices: indices.address() + u64::from(geometry.first_index) * 4,
-                triangle_count: geometry.index_count / 3,
-                flags: if geometry.mesh_from_primitive == Affine3A::IDENTITY { 0 } else { GEOMETRY_MOVED },
-                mesh_from_primitive: rows_of(&geometry.mesh_from_primitive),
-                previous_mesh_from_primitive: rows_of(&geometry.mesh_from_primitive),
-                ..bytemuck::Zeroable::zeroed()
-            })
-            .collect();
+        let attributes = attributes_of(&mesh);
+        let vertices = Arc::new(Vertices {
+            positions: make("positions", mesh.positions.len() * 12)?,
+            attributes: make("attributes", size_of_val(attributes.as_slice()))?,
+            indices: make("indices", mesh.indices.len() * 4)?,
+        });
+        recorder.upload(&vertices.positions, 0, bytemuck::cast_slice(&mesh.positions))?;
+        recorder.upload(&vertices.attributes, 0, bytemuck::cast_slice(&attributes))?;
+        recorder.upload(&vertices.indices, 0, bytemuck::cast_slice(&mesh.indices))?;
+        let records: Vec<_> = mesh.geometries.iter().map(|geometry| record_of(geometry, &vertices)).collect();
         let geometries = make("geometries", size_of_val(records.as_slice()))?;
-        recorder.upload(&geometries, 0, bytemuck::cast_slice(&records))?;
-        let host = Arc::clone(mesh);
-        let centre = centre_of(&host);
-        self.by_id.insert(
-            id,
-            GpuMesh {
-                positions,
-                attributes: attribute_buffer,
-                indices,
-                geometries,
-                deformation,
-                host,
-                centre,
-            },
-        );
+        self.dirty.extend((0..records.len() as u32).map(|geometry| (id, geometry)));
+        let bounds: Vec<_> = mesh.geometries.iter().map(|geometry| bounds_of(&mesh, geometry)).collect();
+        let centre = centre_of(&mesh, &bounds);
+        let new = GpuMesh { vertices, records, geometries, deformation, host: mesh, bounds, centre };
+        self.triangle_count += new.triangle_count();
+        let old = self.by_id.insert(id, new);
+        self.triangle_count -= old.as_ref().map_or(0, GpuMesh::triangle_count);
+        Ok(old.is_some())
+    }
+
+    /// Moves a primitive inside its mesh. True: it was turned over, or turned back.
+    ///
+    /// # Errors
+    /// When there is no such mesh or primitive, or the map is not finite.
+    pub(crate) fn set_primitive(
+        &mut self,
+        id: MeshId,
+        geometry: u32,
+        mesh_from_primitive: &Affine3A,
+    ) -> Result<bool> {
+        let unknown =
+            || RendererError::Unknown { what: "primitive of a mesh", id: format!("{}/{geometry}", id.0) };
+        let mesh = self.by_id.get_mut(&id).ok_or_else(unknown)?;
+        let record = mesh.records.get_mut(geometry as usize).ok_or_else(unknown)?;
+        if !mesh_from_primitive.is_finite() {
+            let what = "finite transform for a primitive of mesh";
+            return Err(RendererError::Unknown { what, id: mesh.host.name.clone() });
+        }
+        if !self.moved_last_frame.contains(&(id, geometry)) {
+            record.previous_mesh_from_primitive = record.mesh_from_primitive;
+        }
+        record.mesh_from_primitive = rows_of(mesh_from_primitive);
+        record.flags = GEOMETRY_MOVED | GEOMETRY_MOVING;
+        self.moved_last_frame.insert((id, geometry));
+        let host = &mut Arc::make_mut(&mut mesh.host).geometries[geometry as usize];
+        let old = std::mem::replace(&mut host.mesh_from_primitive, *mesh_from_primitive);
+        mesh.centre = centre_of(&mesh.host, &mesh.bounds);
+        self.dirty.insert((id, geometry));
+        Ok(turned(&old) != turned(mesh_from_primitive))
+    }
+
+    /// A frame has gone by: primitives that moved in it stand still until they move again.
+    pub(crate) fn settle(&mut self) {
+        for (id, geometry) in std::mem::take(&mut self.moved_last_frame) {
+            let Some(mesh) = self.by_id.get_mut(&id) else { continue };
+            let Some(record) = mesh.records.get_mut(geometry as usize) else { continue };
+            record.previous_mesh_from_primitive = record.mesh_from_primitive;
+            record.flags = moved_flag(&mesh.host.geometries[geometry as usize].mesh_from_primitive);
+            self.dirty.insert((id, geometry));
+        }
+    }
+
+    pub(crate) fn is_dirty(&self) -> bool {
+        !self.dirty.is_empty()
+    }
+
+    /// Uploads the geometry records that changed.
+    pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
+        for (id, geometry) in std::mem::take(&mut self.dirty) {
+            let Some(mesh) = self.by_id.get(&id) else { continue };
+            let Some(record) = mesh.records.get(geometry as usize) else { continue };
+            let offset = record_offset(geometry as usize);
+            recorder.upload(&mesh.geometries, offset, bytemuck::bytes_of(record))?;
+        }
         Ok(())
     }
 
     pub(crate) fn remove(&mut self, id: MeshId) {
-        self.by_id.remove(&id);
+        if let Some(old) = self.by_id.remove(&id) {
+            self.triangle_count -= old.triangle_count();
+        }
     }
 
     pub(crate) fn triangle_count(&self) -> u64 {
-        self.by_id.values().map(|mesh| mesh.host.indices.len() as u64 / 3).sum()
+        self.triangle_count
     }
+}
+
+fn record_offset(index: usize) -> u64 {
+    (index * size_of::<gpu_types::Geometry>()) as u64
+}
+
+fn record_of(geometry: &delta::Geometry, vertices: &Vertices) -> gpu_types::Geometry {
+    gpu_types::Geometry {
+        positions: vertices.positions.address(),
+        previous_positions: vertices.positions.address(),
+        attributes: vertices.attributes.address(),
+        indices: vertices.indices.address() + u64::from(geometry.first_index) * 4,
+        triangle_count: geometry.index_count / 3,
+        flags: moved_flag(&geometry.mesh_from_primitive),
+        mesh_from_primitive: rows_of(&geometry.mesh_from_primitive),
+        previous_mesh_from_primitive: rows_of(&geometry.mesh_from_primitive),
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+fn moved_flag(map: &Affine3A) -> u32 {
+    if *map == Affine3A::IDENTITY { 0 } else { GEOMETRY_MOVED }
+}
+
+fn turned(map: &Affine3A) -> bool {
+    map.matrix3.determinant() < 0.0
 }
 
 /// Three rows of an affine map.
@@ -164,22 +256,37 @@ pub(crate) fn rows_of(map: &Affine3A) -> Rows {
     ]
 }
 
+/// Bounds of a primitive, primitive space; a point at the origin when it has no triangles.
+fn bounds_of(mesh: &Mesh, geometry: &delta::Geometry) -> (Vec3, Vec3) {
+    let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
+    let points = mesh.indices[range].iter().map(|i| mesh.positions[*i as usize]);
+    points.map(|p| (p, p)).reduce(join).unwrap_or((Vec3::ZERO, Vec3::ZERO))
+}
+
+fn join(a: (Vec3, Vec3), b: (Vec3, Vec3)) -> (Vec3, Vec3) {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+/// Bounds of a box after a map.
+fn placed((low, high): (Vec3, Vec3), map: &Affine3A) -> (Vec3, Vec3) {
+    let (centre, half) = ((low + high) * 0.5, (high - low) * 0.5);
+    let m = map.matrix3;
+    let reach = Vec3::from(m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z);
+    let centre = map.transform_point3(centre);
+    (centre - reach, centre + reach)
+}
+
 /// Middle of the bounds of all primitives, mesh space.
-fn centre_of(mesh: &Mesh) -> Vec3 {
-    let placed = mesh.geometries.iter().flat_map(|geometry| {
-        let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
-        let place = geometry.mesh_from_primitive;
-        mesh.indices[range].iter().map(move |i| place.transform_point3(mesh.positions[*i as usize]))
-    });
-    let bounds = placed.fold(None, |bounds: Option<(Vec3, Vec3)>, p| {
-        Some(bounds.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))
-    });
-    bounds.map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5)
+fn centre_of(mesh: &Mesh, bounds: &[(Vec3, Vec3)]) -> Vec3 {
+    let all =
+        mesh.geometries.iter().zip(bounds).map(|(geometry, b)| placed(*b, &geometry.mesh_from_primitive));
+    all.reduce(join).map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5)
 }
 
 /// The mesh with the triangles of each geometry in spatial order.
 fn in_spatial_order(mesh: &Mesh) -> Mesh {
-    let mut sorted = mesh.clone();
+    // What deforms is on the device alone.
+    let mut sorted = Mesh { deformation: None, ..mesh.clone() };
     for geometry in &mesh.geometries {
         let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
         sort_triangles(&mesh.positions, &mut sorted.indices[range]);

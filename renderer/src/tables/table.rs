@@ -41,6 +41,12 @@ impl<T: Pod> Table<T> {
         self.host = values;
     }
 
+    /// Forgets every entry; the memory on the device stays.
+    pub(crate) fn clear(&mut self) {
+        self.host.clear();
+        self.dirty.clear();
+    }
+
     pub(crate) fn get(&self, index: usize) -> Option<&T> {
         self.host.get(index)
     }
@@ -56,6 +62,15 @@ impl<T: Pod> Table<T> {
     /// Device address; 0 before the first upload.
     pub(crate) fn address(&self) -> u64 {
         self.buffer.as_ref().map_or(0, Buffer::address)
+    }
+
+    /// Records the copy of what the device holds back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        let bytes = (self.host.len() * size_of::<T>()) as u64;
+        match &self.buffer {
+            Some(buffer) if bytes > 0 => Download::new(recorder, buffer, bytes),
+            _ => Ok(Download { host: None, bytes: 0 }),
+        }
     }
 
     /// Uploads what changed since the last call.
@@ -79,6 +94,34 @@ impl<T: Pod> Table<T> {
         }
         self.dirty.clear();
         Ok(())
+    }
+}
+
+/// A copy of a table on its way back to the host.
+#[derive(Default)]
+pub(crate) struct Download {
+    host: Option<Buffer>,
+    bytes: usize,
+}
+
+impl Download {
+    /// Records the copy of a whole buffer.
+    pub(crate) fn of(recorder: &mut Recorder, buffer: &Buffer) -> Result<Self> {
+        Self::new(recorder, buffer, buffer.size())
+    }
+
+    fn new(recorder: &mut Recorder, buffer: &Buffer, bytes: u64) -> Result<Self> {
+        let kind = MemoryUse::Staging;
+        let host =
+            Buffer::new(recorder.device(), "download", bytes, BufferUse::General, Location::ReadBack, kind)?;
+        recorder.copy_buffer(buffer, &host, bytes)?;
+        Ok(Self { host: Some(host), bytes: bytes as usize })
+    }
+
+    /// The entries, once the copy has finished.
+    pub(crate) fn read<T: Pod>(&self) -> Vec<T> {
+        let bytes = self.host.as_ref().map_or(&[][..], |host| &host.mapped()[..self.bytes]);
+        bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
     }
 }
 

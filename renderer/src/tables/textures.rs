@@ -82,6 +82,11 @@ impl Textures {
         }
     }
 
+    /// The texture in a slot.
+    pub(crate) fn id_of(&self, slot: u32) -> Option<TextureId> {
+        self.by_slot.get(&slot).copied()
+    }
+
     /// Slot of a texture in the shader's array.
     pub(crate) fn slot(&self, id: TextureId) -> u32 {
         self.by_id.get(&id).map_or(NO_TEXTURE, |entry| entry.slot)

@@ -5,10 +5,13 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
+use super::deform::{DeformPose, MorphTarget, Reach, SkinData, join};
 use crate::ids::MaterialId;
 
 /// Vertices and indices. All arrays but `tex_coords1` and `colors` hold one entry a vertex; those two
-/// may be empty. Every index is below `positions.len()`, every number is finite.
+/// may be empty. Every index is below `positions.len()`, every number is finite. What bends the vertices
+/// (`skin`, `morph`) is shared by all primitives; those whose file has none of it are held by no joint and have
+/// deltas of zero.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
     /// Positions, mesh space, metres.
@@ -25,6 +28,10 @@ pub struct MeshData {
     pub colors: Vec<Vec4>,
     /// Three a triangle, the primitives one after the other.
     pub indices: Vec<u32>,
+    /// Joints of the vertices, when a skin can bend them.
+    pub skin: Option<SkinData>,
+    /// Morph targets.
+    pub morph: Vec<MorphTarget>,
 }
 
 /// A mesh: shared vertices, cut into primitives.
@@ -38,6 +45,10 @@ pub struct Mesh {
     pub primitives: Vec<Primitive>,
     /// Smallest and largest corner in mesh space, primitive transforms included; `None` without triangles.
     pub bounds: Option<(DVec3, DVec3)>,
+    /// Weights of the morph targets unless a node, part or clip says otherwise, one a target.
+    pub default_weights: Vec<f32>,
+    /// One a primitive; empty for a mesh that nothing bends.
+    reach: Vec<Reach>,
 }
 
 /// A range of a mesh's indices with one material.
@@ -54,20 +65,29 @@ pub struct Primitive {
 }
 
 impl Mesh {
-    /// A mesh with its bounds computed.
+    /// A mesh with its bounds computed; its morph targets have weight 0.
     pub fn new(name: String, data: Arc<MeshData>, primitives: Vec<Primitive>) -> Self {
-        let mut mesh = Self { name, data, primitives, bounds: None };
+        let default_weights = vec![0.0; data.morph.len()];
+        let mut mesh = Self { name, data, primitives, bounds: None, default_weights, reach: Vec::new() };
         mesh.update_bounds();
+        if mesh.data.skin.is_some() || !mesh.data.morph.is_empty() {
+            let reach = |primitive| Reach::of(&mesh.data, mesh.indices_of(primitive));
+            mesh.reach = mesh.primitives.iter().map(reach).collect();
+        }
         mesh
     }
 
     /// Computes `bounds` again, as after a primitive moved.
     pub fn update_bounds(&mut self) {
-        self.bounds = self
-            .primitives
-            .iter()
-            .filter_map(|primitive| self.primitive_bounds(primitive))
-            .reduce(|(a0, a1), (b0, b1)| (a0.min(b0), a1.max(b1)));
+        self.bounds =
+            self.primitives.iter().filter_map(|primitive| self.primitive_bounds(primitive)).reduce(join);
+    }
+
+    /// Smallest and largest corner in a pose, mesh space: never too small, perhaps too large. Costs the joints
+    /// and targets, not the vertices.
+    pub fn posed_bounds(&self, pose: &DeformPose) -> Option<(DVec3, DVec3)> {
+        let posed = |(reach, primitive): (&Reach, &Primitive)| reach.posed(pose, primitive);
+        self.reach.iter().zip(&self.primitives).filter_map(posed).reduce(join)
     }
 
     /// Smallest and largest corner of one primitive, mesh space.

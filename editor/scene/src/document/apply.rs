@@ -6,7 +6,7 @@ use crate::assets::{Camera, Environment, Light, Material};
 use crate::changes::Content;
 use crate::edit::{Edit, EditError, OverrideField};
 use crate::ids::{MaterialId, MeshId, Target};
-use crate::node::{Node, NodeKind};
+use crate::node::{Node, NodeKind, RayVisibility};
 use crate::package::MaterialEntry;
 use crate::prefab::PartOverride;
 use crate::transform::Local;
@@ -28,6 +28,11 @@ impl Document {
             Edit::SetTransform { target, local } => self.set_transform(target, local),
             Edit::Rename { target, name } => self.rename(target, name),
             Edit::SetVisible { target, visible } => self.set_visible(target, visible),
+            Edit::SetRayVisibility { target, camera_visible, casts_shadows } => {
+                self.set_ray_visibility(target, RayVisibility { camera_visible, casts_shadows })
+            }
+            Edit::SetMorphWeights { target, weights } => self.set_morph_weights(target, weights),
+            Edit::SetClip { node, clip } => self.set_clip(node, clip),
             Edit::ResetOverride { target, field } => self.reset_override(target, field),
             Edit::AssignMaterial { target, primitive, material } => {
                 self.assign_material(target, primitive, material)
@@ -129,6 +134,33 @@ impl Document {
         Ok(inverse)
     }
 
+    fn set_ray_visibility(&mut self, target: Target, rays: RayVisibility) -> Result<Edit, EditError> {
+        let before = self.ray_visibility(target);
+        let set = |old: RayVisibility| {
+            let RayVisibility { camera_visible, casts_shadows } = old;
+            Edit::SetRayVisibility { target, camera_visible, casts_shadows }
+        };
+        let inverse = match target.part {
+            None => set(std::mem::replace(&mut self.node_mut(target)?.ray_visibility, rays)),
+            Some(_) => {
+                match self.change_override(target, |o| o.ray_visibility = Some(rays))?.ray_visibility {
+                    Some(old) => set(old),
+                    None => reset(target, OverrideField::RayVisibility),
+                }
+            }
+        };
+        self.report_rays(target, before);
+        Ok(inverse)
+    }
+
+    /// Marks a placed mesh that other rays meet than before.
+    fn report_rays(&mut self, target: Target, before: Option<RayVisibility>) {
+        if self.ray_visibility(target) != before {
+            let content = Content { mesh: self.content_of(target).mesh, ..Content::default() };
+            self.changes.target_shown(target, content);
+        }
+    }
+
     fn assign_material(
         &mut self,
         target: Target,
@@ -209,6 +241,7 @@ impl Document {
     }
 
     fn reset_override(&mut self, target: Target, field: OverrideField) -> Result<Edit, EditError> {
+        let (rays, weights) = (self.ray_visibility(target), self.shown_weights(target));
         let old = self.change_override(target, |o| match field {
             OverrideField::Name => o.name = None,
             OverrideField::Local => o.local = None,
@@ -218,6 +251,8 @@ impl Document {
             }
             OverrideField::Light => o.light = None,
             OverrideField::Camera => o.camera = None,
+            OverrideField::Weights => o.weights = None,
+            OverrideField::RayVisibility => o.ray_visibility = None,
             OverrideField::All => *o = PartOverride::default(),
         })?;
         let edits = restoring_edits(target, old, field);
@@ -233,6 +268,8 @@ impl Document {
                 _ => {}
             }
         }
+        self.report_rays(target, rays);
+        self.report_weights(target, weights);
         self.changes.structure = true;
         self.mark_target_dirty(target);
         Ok(Edit::batch(String::new(), edits))
@@ -250,6 +287,7 @@ impl Document {
         }
         self.require_material(id)?;
         let entry = self.materials.entry(id).or_default();
+        self.surroundings.note_material(Some(&entry.value), Some(&value));
         let old = std::mem::replace(&mut entry.value, value);
         self.changes.materials.insert(id);
         Ok(Edit::SetMaterial { material: id, value: Box::new(old) })
@@ -263,6 +301,7 @@ impl Document {
             return Err(EditError::NotFinite);
         }
         self.reserve_ids_up_to(id.0);
+        self.surroundings.note_material(None, Some(&entry.value));
         self.materials.insert(id, entry);
         self.changes.removed_materials.remove(&id);
         self.changes.materials.insert(id);
@@ -276,6 +315,7 @@ impl Document {
             return Err(EditError::InUse { what, by });
         }
         let entry = self.materials.remove(&id).unwrap_or_default();
+        self.surroundings.note_material(Some(&entry.value), None);
         self.changes.materials.remove(&id);
         self.changes.removed_materials.insert(id);
         Ok(Edit::AddMaterial { material: id, entry: Box::new(entry) })
@@ -291,6 +331,7 @@ impl Document {
             return Err(EditError::NotFinite);
         }
         self.changes.environment = true;
+        self.forget_reported_environment();
         let old = std::mem::replace(&mut self.environment, environment);
         Ok(Edit::SetEnvironment(old))
     }
@@ -308,7 +349,7 @@ impl Document {
         let slot = mesh.primitives.get_mut(primitive as usize).ok_or(EditError::NoPrimitive { primitive })?;
         let old = std::mem::replace(&mut slot.mesh_from_primitive, mesh_from_primitive);
         mesh.update_bounds();
-        self.changes.primitive_transforms.insert(id);
+        self.changes.primitive_transforms.insert((id, primitive));
         Ok(Edit::SetPrimitiveTransform { mesh: id, primitive, mesh_from_primitive: old })
     }
 
@@ -326,10 +367,11 @@ impl Document {
     fn report_changed(&mut self, target: Target) {
         let content = Content { mesh: true, ..self.content_of(target) };
         self.changes.target_changed(target, content);
+        self.note_shine(target);
     }
 
     /// Changes the override of a part, in the map by path and in the one by index, and returns the old one.
-    fn change_override(
+    pub(super) fn change_override(
         &mut self,
         target: Target,
         change: impl FnOnce(&mut PartOverride),
@@ -338,7 +380,7 @@ impl Document {
         let (Some(part), Some(slot)) = (target.part, self.slots.get_mut(&target.node)) else {
             return Err(no_part);
         };
-        let NodeKind::Prefab { prefab, overrides } = &mut slot.node.kind else {
+        let NodeKind::Prefab { prefab, overrides, .. } = &mut slot.node.kind else {
             return Err(no_part);
         };
         let Some(path) = self.prefabs.get(prefab).and_then(|p| p.path_of(part)) else {
@@ -357,7 +399,7 @@ impl Document {
     }
 }
 
-fn reset(target: Target, field: OverrideField) -> Edit {
+pub(super) fn reset(target: Target, field: OverrideField) -> Edit {
     Edit::ResetOverride { target, field }
 }
 
@@ -385,6 +427,13 @@ fn restoring_edits(target: Target, old: PartOverride, field: OverrideField) -> V
     }
     if let Some(camera) = old.camera.filter(|_| wants(OverrideField::Camera)) {
         edits.push(Edit::SetCamera { target, camera });
+    }
+    if let Some(weights) = old.weights.filter(|_| wants(OverrideField::Weights)) {
+        edits.push(Edit::SetMorphWeights { target, weights });
+    }
+    if let Some(rays) = old.ray_visibility.filter(|_| wants(OverrideField::RayVisibility)) {
+        let RayVisibility { camera_visible, casts_shadows } = rays;
+        edits.push(Edit::SetRayVisibility { target, camera_visible, casts_shadows });
     }
     edits
 }

@@ -79,6 +79,7 @@ impl Document {
         }
         for (id, entry) in package.materials {
             self.reserve_ids_up_to(id.0);
+            self.surroundings.note_material(None, Some(&entry.value));
             self.materials.insert(id, entry);
             self.changes.removed_materials.remove(&id);
             self.changes.materials.insert(id);
@@ -98,11 +99,13 @@ impl Document {
         for (id, _) in &package.meshes {
             self.meshes.remove(id);
             self.changes.meshes.remove(id);
-            self.changes.primitive_transforms.remove(id);
             self.changes.removed_meshes.insert(*id);
         }
+        let gone: Vec<MeshId> = package.meshes.iter().map(|(id, _)| *id).collect();
+        self.changes.primitive_transforms.retain(|(id, _)| !gone.contains(id));
         for (id, _) in &package.materials {
-            self.materials.remove(id);
+            let old = self.materials.remove(id);
+            self.surroundings.note_material(old.as_ref().map(|entry| &entry.value), None);
             self.changes.materials.remove(id);
             self.changes.removed_materials.insert(*id);
         }
@@ -118,14 +121,14 @@ impl Document {
     fn user_of_prefab(&self, id: PrefabId, prefab: &Prefab) -> Option<String> {
         self.slots.iter().find_map(|(node_id, slot)| {
             let uses = match &slot.node.kind {
-                NodeKind::Prefab { prefab: other, overrides } => {
+                NodeKind::Prefab { prefab: other, overrides, .. } => {
                     *other == id
                         || overrides
                             .values()
                             .flat_map(|o| o.materials.values())
                             .any(|material| prefab.materials.contains(material))
                 }
-                NodeKind::Mesh { mesh, materials } => {
+                NodeKind::Mesh { mesh, materials, .. } => {
                     prefab.meshes.contains(mesh) || materials.iter().any(|m| prefab.materials.contains(m))
                 }
                 NodeKind::Group | NodeKind::Light(_) | NodeKind::Camera(_) => false,

@@ -9,6 +9,7 @@ use super::{Document, PartStates, Slot};
 use crate::edit::{Edit, EditError};
 use crate::ids::{NodeId, Target};
 use crate::node::{Node, NodeKind, Subtree};
+use crate::prefab::PartOverride;
 use crate::transform::Local;
 
 impl Document {
@@ -56,11 +57,7 @@ impl Document {
         let mut subtree = Subtree::default();
         for id in self.subtree_ids(top) {
             self.report_removed(id);
-            let target_span = Target::node(id)..=Target::part(id, u32::MAX);
-            let stale: Vec<Target> = self.dirty_parts.range(target_span).copied().collect();
-            for target in stale {
-                self.dirty_parts.remove(&target);
-            }
+            self.forget_dirty_parts(id);
             if let Some(slot) = self.slots.remove(&id) {
                 subtree.nodes.push((id, slot.node));
             }
@@ -200,7 +197,9 @@ impl Document {
         let finite = match &node.kind {
             NodeKind::Light(light) => light.is_finite(),
             NodeKind::Camera(camera) => camera.is_finite(),
-            _ => true,
+            NodeKind::Mesh { weights, .. } => weights.iter().all(|weight| weight.is_finite()),
+            NodeKind::Prefab { overrides, .. } => overrides.values().all(PartOverride::is_finite),
+            NodeKind::Group => true,
         };
         if !finite || !node.local.is_finite() {
             return Err(EditError::NotFinite);
@@ -218,7 +217,7 @@ impl Document {
 
     /// The derived state of an instance, before its transforms are computed.
     pub(super) fn part_states(&self, node: &Node) -> PartStates {
-        let NodeKind::Prefab { prefab, overrides } = &node.kind else {
+        let NodeKind::Prefab { prefab, overrides, .. } = &node.kind else {
             return PartStates::default();
         };
         let Some(prefab) = self.prefabs.get(prefab) else {
@@ -226,11 +225,13 @@ impl Document {
         };
         PartStates {
             worlds: vec![DAffine3::IDENTITY; prefab.nodes().len()],
+            in_instance: Vec::new(),
             shown: vec![true; prefab.nodes().len()],
             overrides: overrides
                 .iter()
                 .filter_map(|(path, value)| Some((prefab.part_at(path)?, value.clone())))
                 .collect(),
+            pose: self.pose_of(node),
         }
     }
 }

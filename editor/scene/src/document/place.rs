@@ -5,7 +5,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::{Document, Slot, node_content, part_content};
-use crate::assets::{Camera, Environment, Light, Mesh};
+use crate::assets::{Bounds, Camera, Light, Mesh, join, moved};
 use crate::changes::Content;
 use crate::ids::{MaterialId, MeshId, NodeId, Target};
 use crate::node::NodeKind;
@@ -23,6 +23,12 @@ pub struct Renderable {
     pub materials: Vec<MaterialId>,
     /// False: hidden, by itself or from above.
     pub visible: bool,
+    /// A skin or morph targets bend it: see [`Document::deform_pose`].
+    pub deform: bool,
+    /// False: the camera does not see it.
+    pub camera_visible: bool,
+    /// False: it stops no light.
+    pub casts_shadows: bool,
 }
 
 /// A light or camera that is placed.
@@ -41,13 +47,18 @@ pub struct Placed<T> {
 impl Document {
     /// One placed mesh.
     pub fn renderable(&self, target: Target) -> Option<Renderable> {
-        let mesh = self.mesh_of(target)?;
+        let id = self.mesh_of(target)?;
+        let mesh = self.mesh(id)?;
+        let rays = self.ray_visibility(target)?;
         Some(Renderable {
             target,
-            mesh,
-            world_from_mesh: self.world_from(target)?,
-            materials: self.materials_of(target, self.mesh(mesh)?),
+            mesh: id,
+            world_from_mesh: self.world_from_mesh(target)?,
+            materials: self.materials_of(target, mesh),
             visible: self.shown_now(target),
+            deform: self.deforms(target, mesh),
+            camera_visible: rays.camera_visible,
+            casts_shadows: rays.casts_shadows,
         })
     }
 
@@ -89,69 +100,36 @@ impl Document {
     /// Smallest and largest corner of all visible meshes, world space; `None` when there are none. Meshes
     /// whose place is not finite are left out.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.renderables()
-            .filter(|placed| placed.visible)
-            .filter_map(|placed| self.placed_bounds(&placed))
+        self.targets_with(|content| content.mesh)
+            .filter(|&target| self.shown_now(target))
+            .filter_map(|target| self.own_bounds(target))
             .reduce(join)
     }
 
-    /// Smallest and largest corner of what hangs at and below a target, world space, hidden or not.
+    /// Smallest and largest corner of what hangs at and below a target, world space, hidden or not. Walks all
+    /// of it; for the target alone there is [`Self::own_bounds`].
     pub fn bounds_of(&self, target: Target) -> Option<(DVec3, DVec3)> {
-        let mut bounds = None;
+        let mut bounds: Option<Bounds> = None;
         let mut stack = vec![target];
         while let Some(target) = stack.pop() {
-            let own = self.renderable(target).and_then(|placed| self.placed_bounds(&placed));
-            bounds = match (bounds, own) {
-                (Some(a), Some(b)) => Some(join(a, b)),
-                (a, b) => a.or(b),
-            };
+            let own = self.own_bounds(target);
+            bounds = bounds.into_iter().chain(own).reduce(join);
             stack.extend(self.children_of(target));
         }
         bounds
     }
 
-    fn placed_bounds(&self, placed: &Renderable) -> Option<(DVec3, DVec3)> {
-        let (low, high) = self.mesh(placed.mesh)?.bounds?;
-        let corner = |i: u32| {
-            let pick = |bit: u32, a: f64, b: f64| if i & bit == 0 { a } else { b };
-            placed.world_from_mesh.transform_point3(DVec3::new(
-                pick(1, low.x, high.x),
-                pick(2, low.y, high.y),
-                pick(4, low.z, high.z),
-            ))
+    /// Smallest and largest corner of the mesh that a target places itself, world space, hidden or not; `None`
+    /// without a mesh and where its place is not finite. A mesh that deforms is taken in its present pose: the
+    /// box is never too small, but can be too large, because it holds the boxes of all joints.
+    pub fn own_bounds(&self, target: Target) -> Option<(DVec3, DVec3)> {
+        let mesh = self.mesh(self.mesh_of(target)?)?;
+        let bounds = match self.deform_pose(target) {
+            Some(pose) => mesh.posed_bounds(&pose)?,
+            None => mesh.bounds?,
         };
-        let bounds = (0..8).map(corner).map(|p| (p, p)).reduce(join)?;
-        (bounds.0.is_finite() && bounds.1.is_finite()).then_some(bounds)
-    }
-
-    /// What surrounds the scene: what was set; else what the first placed prefab with a wish asks for; else,
-    /// when nothing in the scene shines, the built-in sky; else black. Never [`Environment::Auto`].
-    pub fn effective_environment(&self) -> Environment {
-        if self.environment != Environment::Auto {
-            return self.environment.clone();
-        }
-        let wished = self
-            .slots
-            .values()
-            .filter_map(|slot| slot.node.prefab())
-            .filter_map(|id| self.prefab(id))
-            .find_map(|prefab| prefab.environment.clone());
-        match wished {
-            Some(environment) => environment,
-            None if self.has_light() => Environment::Constant(glam::Vec3::ZERO),
-            None => Environment::DefaultSky,
-        }
-    }
-
-    /// Whether something placed shines: a light, or a visible mesh with an untextured emissive material.
-    pub fn has_light(&self) -> bool {
-        let shines = |id: &MaterialId| {
-            self.material(*id).is_some_and(|material| {
-                material.emissive_texture.is_none() && material.emitted_radiance().max_element() > 0.0
-            })
-        };
-        self.lights().next().is_some()
-            || self.renderables().any(|placed| placed.visible && placed.materials.iter().any(shines))
+        let placed = moved(&self.world_from_mesh(target)?, bounds);
+        (placed.0.is_finite() && placed.1.is_finite()).then_some(placed)
     }
 
     fn placed<T>(&self, target: Target, value: T) -> Option<Placed<T>> {
@@ -164,7 +142,7 @@ impl Document {
     }
 
     /// The cached visibility where it is up to date.
-    fn shown_now(&self, target: Target) -> bool {
+    pub(super) fn shown_now(&self, target: Target) -> bool {
         let cached = self.slots.get(&target.node).and_then(|slot| {
             let fresh = !slot.dirty && self.dirty_parts.is_empty();
             match target.part {
@@ -176,24 +154,25 @@ impl Document {
         cached.unwrap_or_else(|| self.effectively_visible(target))
     }
 
-    /// One material a primitive: the override where there is one and it is in the document, else the mesh's.
+    /// One material a primitive.
     fn materials_of(&self, target: Target, mesh: &Mesh) -> Vec<MaterialId> {
-        let own = |index: usize| match target.part {
-            Some(_) => self.part_override(target).and_then(|o| o.materials.get(&(index as u32)).copied()),
-            None => match &self.node(target.node)?.kind {
-                NodeKind::Mesh { materials, .. } => materials.get(index).copied(),
+        (0..).zip(&mesh.primitives).map(|(index, p)| self.material_at(target, index, p.material)).collect()
+    }
+
+    /// Material of a placed primitive: the override where there is one and it is in the document, else the
+    /// mesh's own.
+    pub(super) fn material_at(&self, target: Target, primitive: u32, of_mesh: MaterialId) -> MaterialId {
+        let chosen = match target.part {
+            Some(_) => self.part_override(target).and_then(|o| o.materials.get(&primitive)),
+            None => match self.node(target.node).map(|node| &node.kind) {
+                Some(NodeKind::Mesh { materials, .. }) => materials.get(primitive as usize),
                 _ => None,
             },
         };
-        let primitives = mesh.primitives.iter().enumerate();
-        primitives
-            .map(|(index, primitive)| {
-                own(index).filter(|id| self.material(*id).is_some()).unwrap_or(primitive.material)
-            })
-            .collect()
+        chosen.copied().filter(|id| self.material(*id).is_some()).unwrap_or(of_mesh)
     }
 
-    fn targets_with<'a>(
+    pub(super) fn targets_with<'a>(
         &'a self,
         wanted: impl Fn(Content) -> bool + Copy + 'a,
     ) -> impl Iterator<Item = Target> + 'a {
@@ -217,8 +196,4 @@ impl Document {
             .filter(move |(_, part)| wanted(part_content(part)))
             .map(move |(index, _)| Target::part(id, index as u32))
     }
-}
-
-fn join(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
-    (a.0.min(b.0), a.1.max(b.1))
 }

@@ -2,16 +2,20 @@
 //! In: nodes marked dirty by edits. Out: cached `world_from_node`, and which targets really changed.
 //! Moving a node costs its subtree; nothing here recurses, so depth is no limit.
 
+use std::collections::BTreeSet;
+use std::ops::Range;
+
 use glam::DAffine3;
 
-use super::{Document, PartStates, Slot, node_content, part_content};
-use crate::changes::ChangeSet;
+use super::{Document, Slot, node_content, part_content, prefab_of};
+use crate::changes::{ChangeSet, Content};
 use crate::ids::{NodeId, Target};
-use crate::prefab::{PartOverride, Prefab};
+use crate::prefab::Prefab;
 
 impl Document {
-    /// World transform of a node or part; `None` when it is not in the document. Right also before
-    /// [`Self::update_transforms`], then at the cost of the way up to a node that is up to date.
+    /// World transform of a node or part, in the pose of the time that is shown; `None` when it is not in the
+    /// document. Right also before [`Self::update_transforms`], then at the cost of the way up to a node that is
+    /// up to date.
     pub fn world_from(&self, target: Target) -> Option<DAffine3> {
         let slot = self.slots.get(&target.node)?;
         let Some(part) = target.part else {
@@ -24,11 +28,26 @@ impl Document {
         let mut at = Some(part);
         while let Some(index) = at {
             let here = Target::part(target.node, index);
-            chain.push(self.local(here)?.to_affine());
+            chain.push(self.posed_local(here)?.to_affine());
             at = self.part(here)?.parent;
         }
         let world = self.world_from_node(target.node)?;
         Some(chain.into_iter().rev().fold(world, |world, local| world * local))
+    }
+
+    /// World transform of the mesh that a target places: that of the target, but a skinned mesh stands in the
+    /// space of its instance, where its joints bend it.
+    pub fn world_from_mesh(&self, target: Target) -> Option<DAffine3> {
+        match self.is_skinned(target) {
+            true => self.world_from(Target::node(target.node)),
+            false => self.world_from(target),
+        }
+    }
+
+    /// Whether a skin bends the mesh of a target.
+    pub(super) fn is_skinned(&self, target: Target) -> bool {
+        let prefab = self.slots.get(&target.node).and_then(|slot| prefab_of(&self.prefabs, slot));
+        prefab.zip(target.part).is_some_and(|(prefab, part)| prefab.skin_of(part).is_some())
     }
 
     /// World transform of what a target hangs below; identity for roots.
@@ -65,7 +84,7 @@ impl Document {
         Some(chain.into_iter().rev().fold(world, |world, local| world * local))
     }
 
-    fn has_dirty_parts(&self, node: NodeId) -> bool {
+    pub(super) fn has_dirty_parts(&self, node: NodeId) -> bool {
         let span = Target::node(node)..=Target::part(node, u32::MAX);
         self.dirty_parts.range(span).next().is_some()
     }
@@ -94,6 +113,15 @@ impl Document {
         }
     }
 
+    /// Forgets which parts of a node are stale.
+    pub(super) fn forget_dirty_parts(&mut self, node: NodeId) {
+        let span = Target::node(node)..=Target::part(node, u32::MAX);
+        let stale: Vec<Target> = self.dirty_parts.range(span).copied().collect();
+        for target in stale {
+            self.dirty_parts.remove(&target);
+        }
+    }
+
     /// Computes every stale world transform again and returns how many nodes and parts that were.
     pub fn update_transforms(&mut self) -> usize {
         let mut computed = 0;
@@ -103,8 +131,15 @@ impl Document {
                 computed += self.update_subtree(top);
             }
         }
+        // In order, so that what lies below a part that was just computed comes right after it.
+        let mut fresh = (None, 0..0);
         for target in std::mem::take(&mut self.dirty_parts) {
-            computed += self.update_part_subtree(target);
+            let covered = target.part.is_some_and(|part| fresh.1.contains(&part));
+            if fresh.0 != Some(target.node) || !covered {
+                let run = self.update_part_subtree(target);
+                computed += run.len();
+                fresh = (Some(target.node), run);
+            }
         }
         computed
     }
@@ -130,72 +165,100 @@ impl Document {
             let world = parent_world * slot.node.local.to_affine();
             let shown = parent_shown && slot.node.visible;
             let content = node_content(&slot.node.kind);
-            if world != slot.world {
+            let moved = world != slot.world;
+            if moved {
                 self.changes.target_moved(Target::node(id), content);
             }
             if shown != slot.shown {
-                self.changes.target_changed(Target::node(id), content);
+                self.changes.target_shown(Target::node(id), content);
             }
             (slot.world, slot.shown, slot.dirty) = (world, shown, false);
             computed += 1;
-            if let Some(prefab) = slot.node.prefab().and_then(|p| self.prefabs.get(&p)) {
-                computed += update_parts(id, slot, prefab, 0..u32::MAX, &mut self.changes);
-            }
             stack.extend(slot.node.children.iter().map(|&child| (child, world, shown)));
+            if let Some(prefab) = prefab_of(&self.prefabs, slot) {
+                computed += update_parts(id, slot, prefab, 0..u32::MAX, moved, &mut self.changes).len();
+                if !self.dirty_parts.is_empty() {
+                    self.forget_dirty_parts(id);
+                }
+            }
         }
         computed
     }
 
-    fn update_part_subtree(&mut self, target: Target) -> usize {
+    /// Returns the run of parts that was computed.
+    fn update_part_subtree(&mut self, target: Target) -> Range<u32> {
         let (Some(part), Some(slot)) = (target.part, self.slots.get_mut(&target.node)) else {
-            return 0;
+            return 0..0;
         };
-        let Some(prefab) = slot.node.prefab().and_then(|p| self.prefabs.get(&p)) else {
-            return 0;
+        let Some(prefab) = prefab_of(&self.prefabs, slot) else {
+            return 0..0;
         };
         let range = part..prefab.subtree_end(part);
-        update_parts(target.node, slot, prefab, range, &mut self.changes)
+        update_parts(target.node, slot, prefab, range, false, &mut self.changes)
     }
 }
 
-/// Computes a run of parts again; those above the run, and the instance itself, are up to date.
+/// Computes a run of parts again; those above the run, and the instance itself, are up to date. `moved` says
+/// that the instance has another place now. Returns the run, cut to the parts that there are.
 fn update_parts(
     id: NodeId,
     slot: &mut Slot,
     prefab: &Prefab,
-    range: std::ops::Range<u32>,
+    range: Range<u32>,
+    moved: bool,
     changes: &mut ChangeSet,
-) -> usize {
-    let PartStates { worlds, shown, overrides } = &mut slot.parts;
-    worlds.resize(prefab.nodes().len(), DAffine3::IDENTITY);
-    shown.resize(prefab.nodes().len(), true);
-    let run = range.start as usize..(range.end as usize).min(prefab.nodes().len());
-    let computed = run.len();
-    for index in run {
-        let Some(part) = prefab.nodes().get(index) else {
+) -> Range<u32> {
+    let count = prefab.nodes().len();
+    slot.parts.worlds.resize(count, DAffine3::IDENTITY);
+    slot.parts.shown.resize(count, true);
+    slot.parts.in_instance.resize(if prefab.skins().is_empty() { 0 } else { count }, DAffine3::IDENTITY);
+    let run = range.start..range.end.min(count as u32);
+    let mut bent = BTreeSet::new();
+    for index in run.clone() {
+        let Some(part) = prefab.node(index) else {
             continue;
         };
-        let change: Option<&PartOverride> = overrides.get(&(index as u32));
-        let local = change.and_then(|o| o.local).unwrap_or(part.local);
-        let visible = change.and_then(|o| o.visible).unwrap_or(part.visible);
-        let parent = part.parent.map(|p| p as usize);
-        let above_world = parent.and_then(|p| worlds.get(p).copied()).unwrap_or(slot.world);
-        let above_shown = parent.and_then(|p| shown.get(p).copied()).unwrap_or(slot.shown);
-        let now = (above_world * local.to_affine(), above_shown && visible);
-        let target = Target::part(id, index as u32);
+        let target = Target::part(id, index);
         let content = part_content(part);
-        if let Some(world) = worlds.get_mut(index)
-            && *world != now.0
-        {
-            *world = now.0;
-            changes.target_moved(target, content);
+        let local = slot.parts.posed_local(index, part).to_affine();
+        let parts = &mut slot.parts;
+        let visible = parts.overrides.get(&index).and_then(|o| o.visible).unwrap_or(part.visible);
+        let above = part.parent.map(|parent| parent as usize);
+        let world = above.and_then(|p| parts.worlds.get(p).copied()).unwrap_or(slot.world) * local;
+        let shown = above.and_then(|p| parts.shown.get(p).copied()).unwrap_or(slot.shown) && visible;
+        let part_moved = replace_at(&mut parts.worlds, index, world);
+        let moved_content = match prefab.skin_of(index) {
+            // A skinned mesh goes with its instance, not with its part.
+            Some(_) => Content {
+                mesh: moved,
+                light: content.light && part_moved,
+                camera: content.camera && part_moved,
+            },
+            None if part_moved => content,
+            None => Content::default(),
+        };
+        changes.target_moved(target, moved_content);
+        if replace_at(&mut parts.shown, index, shown) {
+            changes.target_shown(target, content);
         }
-        if let Some(old) = shown.get_mut(index)
-            && *old != now.1
-        {
-            *old = now.1;
-            changes.target_changed(target, content);
+        let in_parent = above.and_then(|p| parts.in_instance.get(p).copied()).unwrap_or(DAffine3::IDENTITY);
+        if replace_at(&mut parts.in_instance, index, in_parent * local) {
+            bent.extend(prefab.bent_by(index));
         }
     }
-    computed
+    for part in bent {
+        changes.target_bent(Target::part(id, part));
+    }
+    run
+}
+
+/// Puts a value in its place and says whether it is another than before; nothing happens past the end.
+fn replace_at<T: PartialEq>(list: &mut [T], index: u32, value: T) -> bool {
+    match list.get_mut(index as usize) {
+        Some(old) if *old != value => {
+            *old = value;
+            true
+        }
+        _ => false,
+    }
 }

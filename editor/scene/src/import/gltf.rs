@@ -1,4 +1,4 @@
-//! glTF 2.0, `.gltf` and `.glb`: container, checks, then meshes, materials, textures and the node tree.
+//! glTF 2.0, `.gltf` and `.glb`: container, checks, then meshes, materials, textures, the node tree, skins and clips.
 //! In: a path. Out: [`Imported`]. The JSON is read by our own checked reader: node transforms stay in double
 //! precision, errors name a JSON pointer, and nothing is indexed before it was checked.
 
@@ -9,6 +9,8 @@ use crate::assets::Material;
 use crate::prefab::Prefab;
 
 mod accessor;
+mod animation;
+mod attributes;
 pub(super) mod buffers;
 mod check;
 mod container;
@@ -16,6 +18,7 @@ mod json;
 mod material;
 mod mesh;
 mod node;
+mod skin;
 mod texture;
 
 use json::{Fault, Item};
@@ -56,12 +59,16 @@ fn read(
     if meshes.uses_default_material {
         materials.push(Material { name: "default".to_owned(), ..Material::default() });
     }
-    let tree = node::read_scene(&root, &accessors, &meshes.list)?;
+    let mut tree = node::read_scene(&root, &accessors, &meshes.list)?;
+    let skins = skin::read_all(&root, &accessors, &meshes.list, &mut tree)?;
+    let animations = animation::read_all(&root, &accessors, &meshes.list, &mut tree)?;
     progress("decoding images", 0.5);
     let (textures, image_warnings) =
         textures.load(&root, &buffers, &views, folder, options.max_image_extent_px)?;
     let mut prefab = Prefab::new(file_stem(path), path);
     prefab.environment = tree.environment;
+    prefab.animations = animations;
+    prefab.set_skins(skins);
     prefab.set_nodes(tree.parts).map_err(|error| Fault::new("/nodes", error.to_string()))?;
     let faults = left_out_warnings(&root, &left_out)?
         .into_iter()
@@ -81,14 +88,6 @@ fn left_out_warnings(root: &Item<'_>, extensions: &[String]) -> Result<Vec<Fault
         .iter()
         .map(|name| Fault::new("/extensionsUsed", format!("{name} is not supported and is left out")))
         .collect();
-    for (key, message) in [
-        ("animations", "animations are not played yet; the pose of the file is shown"),
-        ("skins", "skins are not bent yet; the meshes are shown in their own pose"),
-    ] {
-        if !root.items(key)?.is_empty() {
-            warnings.push(Fault::new(format!("/{key}"), message));
-        }
-    }
     if root.extension("KHR_materials_variants")?.is_some() {
         let message = "of the material variants the default one is shown";
         warnings.push(Fault::new("/extensions/KHR_materials_variants", message));

@@ -180,17 +180,24 @@ impl Loader<'_> {
             self.meta.kept.nodes.insert(id.0, record.other);
         }
         let kind = match record {
-            NodeRecord { prefab: Some(prefab), overrides, .. } => NodeKind::Prefab {
+            NodeRecord { prefab: Some(prefab), overrides, clip, .. } => NodeKind::Prefab {
                 prefab,
+                clip,
                 overrides: overrides.into_iter().map(|(path, value)| (path, value.into())).collect(),
             },
-            NodeRecord { mesh: Some(mesh), materials, .. } => NodeKind::Mesh { mesh, materials },
+            NodeRecord { mesh: Some(mesh), materials, weights, .. } => {
+                NodeKind::Mesh { mesh, materials, weights }
+            }
             NodeRecord { light: Some(light), .. } => NodeKind::Light(light),
             NodeRecord { camera: Some(camera), .. } => NodeKind::Camera(camera),
             _ => NodeKind::Group,
         };
-        let node =
-            Node { visible: record.visible, local: record.local.into(), ..Node::new(record.name, kind) };
+        let node = Node {
+            visible: record.visible,
+            ray_visibility: record.ray_visibility,
+            local: record.local.into(),
+            ..Node::new(record.name, kind)
+        };
         let edit =
             Edit::AddNode { parent: record.parent, index: usize::MAX, subtree: Subtree::single(id, node) };
         self.document

@@ -7,8 +7,10 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::animation::ClipChoice;
 use crate::assets::{Camera, Light, Material};
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, TextureId};
+use crate::node::RayVisibility;
 use crate::prefab::{PartOverride, PartPath};
 use crate::transform::{Local, Trs};
 
@@ -130,6 +132,10 @@ fn is_true(value: &bool) -> bool {
     *value
 }
 
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 /// A node; which of `prefab`, `mesh`, `light` and `camera` is there says what it is, none: a group.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -142,14 +148,22 @@ pub(super) struct NodeRecord {
     pub local: LocalRecord,
     #[serde(default = "yes", skip_serializing_if = "is_true")]
     pub visible: bool,
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub ray_visibility: RayVisibility,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prefab: Option<PrefabId>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub overrides: BTreeMap<PartPath, OverrideRecord>,
+    /// `"none"`, `"all"` or `{"clip": 2}`; absent: the first.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub clip: ClipChoice,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshId>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub materials: Vec<MaterialId>,
+    /// Of the morph targets; absent: those of the mesh.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub weights: Vec<f32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light: Option<Light>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -232,6 +246,7 @@ impl From<LocalRecord> for Local {
 
 /// What an instance says differently about a part.
 #[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(super) struct OverrideRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -245,6 +260,10 @@ pub(super) struct OverrideRecord {
     pub light: Option<Light>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<Vec<f32>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ray_visibility: Option<RayVisibility>,
 }
 
 impl From<PartOverride> for OverrideRecord {
@@ -256,6 +275,8 @@ impl From<PartOverride> for OverrideRecord {
             materials: value.materials,
             light: value.light,
             camera: value.camera,
+            weights: value.weights,
+            ray_visibility: value.ray_visibility,
         }
     }
 }
@@ -269,6 +290,8 @@ impl From<OverrideRecord> for PartOverride {
             materials: record.materials,
             light: record.light,
             camera: record.camera,
+            weights: record.weights,
+            ray_visibility: record.ray_visibility,
         }
     }
 }

@@ -13,6 +13,7 @@ use super::record::{
     ProjectRecord,
 };
 use super::{ProjectMeta, SCHEMA_VERSION};
+use crate::animation::ClipChoice;
 use crate::assets::Environment;
 use crate::document::Document;
 use crate::ids::NodeId;
@@ -104,24 +105,29 @@ fn node(id: NodeId, node: &Node, meta: &ProjectMeta) -> NodeRecord {
         parent: node.parent,
         local: node.local.into(),
         visible: node.visible,
+        ray_visibility: node.ray_visibility,
         prefab: None,
         overrides: BTreeMap::new(),
+        clip: ClipChoice::default(),
         mesh: None,
         materials: Vec::new(),
+        weights: Vec::new(),
         light: None,
         camera: None,
         other: kept(&meta.kept.nodes, id.0),
     };
     match &node.kind {
         NodeKind::Group => {}
-        NodeKind::Prefab { prefab, overrides } => {
+        NodeKind::Prefab { prefab, overrides, clip } => {
             record.prefab = Some(*prefab);
+            record.clip = *clip;
             let overrides = overrides.iter();
             record.overrides =
                 overrides.map(|(path, value)| (path.clone(), OverrideRecord::from(value.clone()))).collect();
         }
-        NodeKind::Mesh { mesh, materials } => {
+        NodeKind::Mesh { mesh, materials, weights } => {
             record.mesh = Some(*mesh);
+            record.weights.clone_from(weights);
             record.materials.clone_from(materials);
         }
         NodeKind::Light(light) => record.light = Some(*light),

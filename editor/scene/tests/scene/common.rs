@@ -1,12 +1,111 @@
 //! A small scene that the tests share: one prefab of four parts, placed twice, beside nodes of every kind.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use caustica_scene::import::{ImportOptions, Imported, load};
 use caustica_scene::{
-    Camera, Document, Light, LightKind, Local, Node, NodeId, NodeKind, PrefabId, Target, Trs,
+    Camera, Document, Light, LightKind, Local, MeshData, Node, NodeId, NodeKind, PrefabId, Target, Trs,
 };
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3, Vec4};
+
+/// The folder of the shared assets, or `None` with a note.
+pub fn assets(part: &str) -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets");
+    let folder = root.join(part);
+    if folder.exists() {
+        return Some(folder);
+    }
+    println!("skipped: {} is absent", folder.display());
+    None
+}
+
+/// A generator that gives the same numbers everywhere (Knuth's MMIX constants).
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    pub fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) as usize) % limit
+    }
+}
+
+/// What [`MeshData`] and the other parts of an import promise.
+pub fn assert_sound(path: &Path, imported: &Imported) {
+    for mesh in &imported.meshes {
+        let data = &mesh.data;
+        let count = data.positions.len();
+        assert_eq!(data.normals.len(), count, "{}", path.display());
+        assert_eq!(data.tangents.len(), count, "{}", path.display());
+        assert_eq!(data.tex_coords0.len(), count, "{}", path.display());
+        assert!([0, count].contains(&data.tex_coords1.len()), "{}", path.display());
+        assert!([0, count].contains(&data.colors.len()), "{}", path.display());
+        assert!(data.positions.iter().all(|p| p.is_finite()), "{}", path.display());
+        let unit = |v: Vec3| (v.length() - 1.0).abs() < 1e-4;
+        assert!(data.normals.iter().all(|&n| unit(n)), "{}", path.display());
+        let whole = |t: &Vec4| unit(t.truncate()) && t.w.abs() == 1.0;
+        assert!(data.tangents.iter().all(whole), "{}", path.display());
+        assert!(data.indices.iter().all(|&i| (i as usize) < count), "{}", path.display());
+        let end = mesh.primitives.last().map_or(0, |p| p.first_index + p.index_count);
+        assert_eq!(end as usize, data.indices.len(), "{}", path.display());
+        assert_deforms_soundly(path, data);
+        assert_eq!(mesh.default_weights.len(), data.morph.len(), "{}", path.display());
+        for primitive in &mesh.primitives {
+            assert!(primitive.index_count > 0, "{}", path.display());
+            let material = primitive.material.0 as usize;
+            assert!(material < imported.materials.len(), "{}", path.display());
+        }
+    }
+    assert_skins_fit(path, imported);
+    for material in &imported.materials {
+        assert!(material.is_finite(), "{}", path.display());
+        let inside = |id: u64| (id as usize) < imported.textures.len();
+        assert!(material.textures().all(|t| inside(t.texture.0)), "{}", path.display());
+    }
+    for texture in &imported.textures {
+        let bytes = texture.width as usize * texture.height as usize * 4;
+        assert_eq!(texture.rgba8.len(), bytes, "{}", path.display());
+    }
+}
+
+fn assert_deforms_soundly(path: &Path, data: &MeshData) {
+    let count = data.positions.len();
+    if let Some(skin) = &data.skin {
+        assert_eq!((skin.joints.len(), skin.weights.len()), (count, count), "{}", path.display());
+        for (joints, weights) in skin.joints.iter().zip(&skin.weights) {
+            let sum: f32 = weights.iter().sum();
+            assert!(sum == 0.0 || (sum - 1.0).abs() < 1e-6, "{}: {weights:?}", path.display());
+            let tidy = |(joint, weight): (&u16, &f32)| *weight > 0.0 || (*weight == 0.0 && *joint == 0);
+            assert!(joints.iter().zip(weights).all(tidy), "{}: {joints:?} {weights:?}", path.display());
+        }
+    }
+    for target in &data.morph {
+        for deltas in [&target.positions, &target.normals, &target.tangents] {
+            assert!([0, count].contains(&deltas.len()), "{}", path.display());
+            assert!(deltas.iter().all(|d| d.is_finite()), "{}", path.display());
+        }
+    }
+}
+
+fn assert_skins_fit(path: &Path, imported: &Imported) {
+    let prefab = &imported.prefab;
+    let parts = prefab.nodes().len() as u32;
+    for skin in prefab.skins() {
+        assert_eq!(skin.joints.len(), skin.inverse_bind.len(), "{}", path.display());
+        assert!(skin.joints.iter().all(|&joint| joint < parts), "{}", path.display());
+    }
+    for (part, node) in (0..).zip(prefab.nodes()) {
+        let Some(skin) = prefab.skin_of(part) else { continue };
+        let mesh = &imported.meshes[node.mesh.unwrap().0 as usize];
+        let joints = &mesh.data.skin.as_ref().unwrap().joints;
+        let inside = |&joint: &u16| (joint as usize) < skin.joints.len();
+        assert!(joints.iter().flatten().all(inside), "{}", path.display());
+    }
+    for channel in prefab.animations.iter().flat_map(|clip| &clip.channels) {
+        assert!(channel.part < parts && channel.width() > 0, "{}", path.display());
+        assert!(channel.times_s.array_windows::<2>().all(|[a, b]| a < b), "{}", path.display());
+        assert!(channel.values.iter().all(|value| value.is_finite()), "{}", path.display());
+    }
+}
 
 /// Two triangles with two materials below a turned node, a lamp and a camera.
 const MODEL: &str = r#"{"asset":{"version":"2.0"},
@@ -75,7 +174,7 @@ pub fn scene(folder: &Path) -> Scene {
         id
     };
     let group = add(Node::new("Group", NodeKind::Group).with_local(trs(10.0, 0.3, 1.5)), None);
-    let instance = || NodeKind::Prefab { prefab, overrides: Default::default() };
+    let instance = || NodeKind::instance_of(prefab);
     let first = add(Node::new("First", instance()), Some(group));
     let second = add(Node::new("Second", instance()).with_local(trs(-3.0, 1.0, 1.0)), None);
     let light =

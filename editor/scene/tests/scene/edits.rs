@@ -256,9 +256,9 @@ fn changes_name_what_changed_and_no_more() {
     document.apply(Edit::SetVisible { target, visible: false }).unwrap();
     let changes = document.drain_changes();
     let sun = Target::node(scene.light);
-    let keys: Vec<Target> = changes.instances.keys().copied().collect();
+    let keys: Vec<Target> = changes.visibility.keys().copied().collect();
     assert_eq!(keys, [plate, lamp, sun]);
-    assert!(changes.transforms.is_empty());
+    assert!(changes.transforms.is_empty() && changes.instances.is_empty() && !changes.environment);
     assert!(!document.renderable(plate).unwrap().visible);
 
     let undo = document.apply(Edit::RemoveNode { node: scene.group }).unwrap();

@@ -2,20 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use caustica_scene::import::{ImportOptions, Imported, load};
-use caustica_scene::{AlphaMode, Document, Environment, LightKind, Local, ShadingMode, Wrap};
-use glam::{Vec3, Vec4};
+use crate::common::{Numbers, assert_sound, assets};
 
-/// The folder of the shared assets, or `None` with a note.
-fn assets(part: &str) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets");
-    let folder = root.join(part);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: {} is absent", folder.display());
-    None
-}
+use caustica_scene::import::{ImportOptions, Imported, load};
+use caustica_scene::{
+    AlphaMode, ClipChoice, Document, Edit, Environment, LightKind, Local, ShadingMode, Wrap,
+};
+use glam::Vec3;
 
 fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
@@ -48,41 +41,6 @@ fn required_extensions(path: &Path) -> Vec<String> {
     let required = json["extensionsRequired"].as_array().cloned();
     let names = required.unwrap_or_default().into_iter();
     names.map(|name| name.as_str().unwrap().to_owned()).collect()
-}
-
-/// What `MeshData` promises.
-fn assert_sound(path: &Path, imported: &Imported) {
-    for mesh in &imported.meshes {
-        let data = &mesh.data;
-        let count = data.positions.len();
-        assert_eq!(data.normals.len(), count, "{}", path.display());
-        assert_eq!(data.tangents.len(), count, "{}", path.display());
-        assert_eq!(data.tex_coords0.len(), count, "{}", path.display());
-        assert!([0, count].contains(&data.tex_coords1.len()), "{}", path.display());
-        assert!([0, count].contains(&data.colors.len()), "{}", path.display());
-        assert!(data.positions.iter().all(|p| p.is_finite()), "{}", path.display());
-        let unit = |v: Vec3| (v.length() - 1.0).abs() < 1e-4;
-        assert!(data.normals.iter().all(|&n| unit(n)), "{}", path.display());
-        let whole = |t: &Vec4| unit(t.truncate()) && t.w.abs() == 1.0;
-        assert!(data.tangents.iter().all(whole), "{}", path.display());
-        assert!(data.indices.iter().all(|&i| (i as usize) < count), "{}", path.display());
-        let end = mesh.primitives.last().map_or(0, |p| p.first_index + p.index_count);
-        assert_eq!(end as usize, data.indices.len(), "{}", path.display());
-        for primitive in &mesh.primitives {
-            assert!(primitive.index_count > 0, "{}", path.display());
-            let material = primitive.material.0 as usize;
-            assert!(material < imported.materials.len(), "{}", path.display());
-        }
-    }
-    for material in &imported.materials {
-        assert!(material.is_finite(), "{}", path.display());
-        let inside = |id: u64| (id as usize) < imported.textures.len();
-        assert!(material.textures().all(|t| inside(t.texture.0)), "{}", path.display());
-    }
-    for texture in &imported.textures {
-        let bytes = texture.width as usize * texture.height as usize * 4;
-        assert_eq!(texture.rgba8.len(), bytes, "{}", path.display());
-    }
 }
 
 #[test]
@@ -269,13 +227,23 @@ fn ten_thousand_levels_load() {
     assert_eq!(imported.prefab.nodes().len(), 10_000);
 }
 
-/// A generator that gives the same numbers everywhere (Knuth's MMIX constants).
-struct Numbers(u64);
-
-impl Numbers {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) as usize) % limit
+/// Whatever a file holds, playing it gives finite numbers.
+fn play(imported: Imported) {
+    let mut document = Document::new();
+    let prefab = document.add_imported(imported).unwrap();
+    let (node, edit) = document.instantiate_edit(prefab, None, Local::default());
+    document.apply(edit).unwrap();
+    for clip in [ClipChoice::First, ClipChoice::All] {
+        document.apply(Edit::SetClip { node, clip }).unwrap();
+        for time_s in [0.0, 0.3, 1e9, -1.0, f64::NAN] {
+            document.set_time(Some(time_s));
+            document.drain_changes();
+            for placed in document.renderables() {
+                let Some(pose) = document.deform_pose(placed.target) else { continue };
+                assert!(pose.joint_matrices.iter().all(|matrix| matrix.is_finite()));
+                assert!(pose.weights.iter().all(|weight| weight.is_finite()));
+            }
+        }
     }
 }
 
@@ -288,6 +256,10 @@ fn files_with_random_damage_never_panic() {
         "gltf/Triangle/glTF-Embedded/Triangle.gltf",
         "gltf/BoxInterleaved/glTF-Binary/BoxInterleaved.glb",
         "gltf/SimpleSkin/glTF-Embedded/SimpleSkin.gltf",
+        "gltf/RiggedSimple/glTF-Binary/RiggedSimple.glb",
+        "gltf/SimpleMorph/glTF/SimpleMorph.gltf",
+        "gltf/AnimatedMorphCube/glTF-Binary/AnimatedMorphCube.glb",
+        "gltf/InterpolationTest/glTF-Binary/InterpolationTest.glb",
         "gltf/BoxTextured/glTF-Binary/BoxTextured.glb",
         "obj/concave/concave.obj",
         "obj/box-objects-groups-materials/box-objects-groups-materials.obj",
@@ -321,6 +293,7 @@ fn files_with_random_damage_never_panic() {
             match load(&path, &ImportOptions::default()) {
                 Ok(imported) => {
                     assert_sound(&path, &imported);
+                    play(imported);
                     loaded += 1;
                 }
                 Err(error) => {

@@ -7,8 +7,14 @@
     reason = "a test that cannot go on has failed"
 )]
 
+mod animation;
+mod changes;
 mod common;
 mod edits;
+mod gltf_file;
 mod import;
+mod oracle;
 mod projects;
+mod rig_import;
+mod speed;
 mod transforms;

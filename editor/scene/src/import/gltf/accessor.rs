@@ -152,6 +152,19 @@ impl<'a> Accessors<'a> {
         self.elements(accessor, zero, read)
     }
 
+    /// The elements of four unsigned components each.
+    pub fn quadruples(&self, index: usize) -> Result<Vec<[u32; 4]>, Fault> {
+        let accessor = self.get(index)?;
+        let component = accessor.component;
+        self.elements(accessor, [0; 4], |element| {
+            let mut out = [0; 4];
+            for (to, from) in out.iter_mut().zip(element.chunks_exact(component.bytes())) {
+                *to = whole(component, from);
+            }
+            out
+        })
+    }
+
     /// The elements as whole numbers that are not negative.
     pub fn indices(&self, index: usize) -> Result<Vec<u32>, Fault> {
         let accessor = self.get(index)?;

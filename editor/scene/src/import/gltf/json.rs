@@ -230,6 +230,25 @@ impl<'a> Item<'a> {
             .ok_or_else(|| self.fault_at(key, format!("expected true or false, found {}", kind(value))))
     }
 
+    /// The numbers of an array member; `None` when it is absent.
+    pub fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>, Fault> {
+        let Some(array) = self.get(key) else {
+            return Ok(None);
+        };
+        let number = |item: Item<'_>| {
+            let number = item.value.as_f64();
+            number.ok_or_else(|| item.fault(format!("expected a number, found {}", kind(item.value))))
+        };
+        array.elements()?.into_iter().map(number).collect::<Result<_, _>>().map(Some)
+    }
+
+    /// The texts of an array member of `extras`, where any program may put anything: what is no text is empty.
+    pub fn extra_texts(&self, key: &str) -> Vec<String> {
+        let array =
+            self.get("extras").and_then(|extras| extras.get(key)).and_then(|array| array.value.as_array());
+        array.into_iter().flatten().map(|value| value.as_str().unwrap_or_default().to_owned()).collect()
+    }
+
     /// The texts of an array member.
     pub fn texts(&self, key: &str) -> Result<Vec<&'a str>, Fault> {
         self.items(key)?

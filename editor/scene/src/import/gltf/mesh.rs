@@ -1,14 +1,13 @@
 //! Meshes: accessors to attributes, any triangle topology to lists, then the mesh builder.
 //! In: JSON and checked accessors. Out: meshes and what was repaired. Points and lines are left out.
 
-use std::collections::HashMap;
-use std::sync::Arc;
+use std::collections::BTreeSet;
 
-use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::super::geometry::{Attributes, MeshBuilder, PrimitiveInput, Repairs};
-use super::accessor::{Accessors, Component};
+use super::super::geometry::{MeshBuilder, PrimitiveInput, Repairs};
+use super::accessor::Accessors;
+use super::attributes::AttributeReader;
 use super::json::{Fault, Item};
 use crate::assets::{Material, Mesh};
 use crate::ids::MaterialId;
@@ -64,13 +63,13 @@ fn read(
     max_elements: usize,
 ) -> Result<OneMesh, Fault> {
     let mut builder = MeshBuilder::default();
-    let mut cache = HashMap::new();
+    let mut attribute_reader = AttributeReader::new(accessors, max_elements);
     let mut warnings = Vec::new();
     let mut uses_default_material = false;
-    let mut morphed = false;
     let mut corners = 0_usize;
+    let mut target_counts = BTreeSet::new();
     for primitive in item.objects("primitives")? {
-        morphed |= !primitive.items("targets")?.is_empty();
+        target_counts.insert(primitive.items("targets")?.len());
         let mode = primitive.size("mode")?.unwrap_or(4);
         if mode > 6 {
             return Err(primitive.fault(format!("mode {mode} does not exist")));
@@ -79,7 +78,7 @@ fn read(
             warnings.push(primitive.fault("points and lines are not shown; it was left out"));
             continue;
         }
-        let Some(attributes) = read_attributes(&primitive, accessors, &mut cache)? else {
+        let Some(attributes) = attribute_reader.read(&primitive, &mut warnings)? else {
             warnings.push(primitive.fault("it has no POSITION; it was left out"));
             continue;
         };
@@ -105,17 +104,50 @@ fn read(
         }
     }
     warnings.extend(repair_warnings(item, &builder.repairs));
-    if morphed {
-        warnings.push(item.fault("morph targets are not animated yet; the base shape is shown"));
+    if target_counts.len() > 1 {
+        warnings.push(
+            item.fault("its primitives differ in their number of morph targets; missing ones do nothing"),
+        );
     }
-    Ok(OneMesh { mesh: builder.finish(item.name()?), uses_default_material, warnings })
+    builder.name_targets(item.extra_texts("targetNames"));
+    let mut mesh = builder.finish(item.name()?);
+    if let Some(weights) = read_weights(item, mesh.data.morph.len(), &mut warnings)? {
+        mesh.default_weights = weights;
+    }
+    Ok(OneMesh { mesh, uses_default_material, warnings })
+}
+
+/// Weights of `count` morph targets, of a mesh or a node; `None` when it has none.
+pub(super) fn read_weights(
+    item: &Item<'_>,
+    count: usize,
+    warnings: &mut Vec<Fault>,
+) -> Result<Option<Vec<f32>>, Fault> {
+    let Some(numbers) = item.numbers("weights")? else {
+        return Ok(None);
+    };
+    if numbers.len() != count {
+        let found = numbers.len();
+        warnings.push(
+            item.fault(format!("it has {found} weights for {count} morph targets; missing ones are 0")),
+        );
+    }
+    let mut weights: Vec<f32> = numbers.into_iter().map(|number| number as f32).collect();
+    weights.resize(count, 0.0);
+    match weights.iter().all(|weight| weight.is_finite()) {
+        true => Ok(Some(weights)),
+        false => Err(item.fault("a weight is too large")),
+    }
 }
 
 fn repair_warnings(item: &Item<'_>, repairs: &Repairs) -> Vec<Fault> {
     let lines = [
         (repairs.degenerate_triangles, "triangles without area were removed"),
         (repairs.non_finite_triangles, "triangles with positions that are not finite were removed"),
-        (repairs.non_finite_values, "texture coordinates or colours were not finite and were replaced"),
+        (
+            repairs.non_finite_values,
+            "texture coordinates, colours, weights or morphs were not finite and were replaced",
+        ),
         (repairs.replaced_normals, "normals had no direction and were replaced by those of their triangles"),
     ];
     lines
@@ -123,85 +155,6 @@ fn repair_warnings(item: &Item<'_>, repairs: &Repairs) -> Vec<Fault> {
         .filter(|(count, _)| *count > 0)
         .map(|(count, what)| item.fault(format!("{count} {what}")))
         .collect()
-}
-
-/// The attributes of a primitive; primitives that name the same accessors share them.
-fn read_attributes(
-    primitive: &Item<'_>,
-    accessors: &Accessors<'_>,
-    cache: &mut HashMap<Vec<(&'static str, usize)>, Arc<Attributes>>,
-) -> Result<Option<Arc<Attributes>>, Fault> {
-    const READ: [&str; 6] = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"];
-    let Some(item) = primitive.child("attributes")? else {
-        return Ok(None);
-    };
-    let mut key = Vec::new();
-    for name in READ {
-        if let Some(index) = item.size(name)? {
-            key.push((name, index));
-        }
-    }
-    if key.first().map(|(name, _)| *name) != Some("POSITION") {
-        return Ok(None);
-    }
-    let draco = primitive.extension("KHR_draco_mesh_compression")?.is_some();
-    if let Some(&(_, position)) = key.first().filter(|_| draco)
-        && !accessors.get(position)?.has_data()
-    {
-        let reason = "its vertices are compressed with KHR_draco_mesh_compression, which is not read yet";
-        return Err(primitive.fault(reason));
-    }
-    if let Some(cached) = cache.get(&key) {
-        return Ok(Some(Arc::clone(cached)));
-    }
-    let mut attributes = Attributes::default();
-    let mut count = None;
-    for &(name, index) in &key {
-        let accessor = accessors.get(index)?;
-        let count = *count.get_or_insert(accessor.count);
-        let widths: &[usize] = match name {
-            "POSITION" | "NORMAL" => &[3],
-            "TANGENT" => &[4],
-            "COLOR_0" => &[3, 4],
-            _ => &[2],
-        };
-        let fault = |reason| Fault::new(format!("{}/{name}", item.place()), reason);
-        if accessor.is_matrix || !widths.contains(&accessor.width) {
-            return Err(fault(format!("accessor {index} has the wrong type")));
-        }
-        if accessor.component == Component::U32 {
-            return Err(fault(format!("accessor {index} has 32-bit integers")));
-        }
-        if accessor.count != count {
-            return Err(fault(format!("it has {} elements, POSITION has {count}", accessor.count)));
-        }
-        match name {
-            "POSITION" => attributes.positions = vec3s(accessors, index)?,
-            "NORMAL" => attributes.normals = Some(vec3s(accessors, index)?),
-            "TANGENT" => attributes.tangents = Some(vec4s(accessors, index)?),
-            "TEXCOORD_0" => attributes.tex_coords0 = Some(vec2s(accessors, index)?),
-            "TEXCOORD_1" => attributes.tex_coords1 = Some(vec2s(accessors, index)?),
-            _ => attributes.colors = Some(vec4s(accessors, index)?),
-        }
-    }
-    let attributes = Arc::new(attributes);
-    cache.insert(key, Arc::clone(&attributes));
-    Ok(Some(attributes))
-}
-
-fn vec2s(accessors: &Accessors<'_>, index: usize) -> Result<Vec<Vec2>, Fault> {
-    let values = accessors.floats::<2>(index, 0.0)?;
-    Ok(values.into_iter().map(Vec2::from).collect())
-}
-
-fn vec3s(accessors: &Accessors<'_>, index: usize) -> Result<Vec<Vec3>, Fault> {
-    let values = accessors.floats::<3>(index, 0.0)?;
-    Ok(values.into_iter().map(Vec3::from).collect())
-}
-
-fn vec4s(accessors: &Accessors<'_>, index: usize) -> Result<Vec<Vec4>, Fault> {
-    let values = accessors.floats::<4>(index, 1.0)?;
-    Ok(values.into_iter().map(Vec4::from).collect())
 }
 
 /// Three checked indices a triangle, from lists, strips and fans, indexed or not.

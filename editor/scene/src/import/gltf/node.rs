@@ -5,6 +5,7 @@ use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
 
 use super::accessor::Accessors;
 use super::json::{Fault, Item};
+use super::mesh::read_weights;
 use crate::assets::{Camera, Environment, Light, LightKind, Mesh, Projection};
 use crate::ids::MeshId;
 use crate::prefab::PartNode;
@@ -25,6 +26,8 @@ const UNIT_TOLERANCE: f64 = 1e-14;
 #[derive(Default)]
 pub(super) struct Tree {
     pub parts: Vec<PartNode>,
+    /// Index of the part that a node of the file became; `None` when the scene does not have it.
+    pub part_of_node: Vec<Option<u32>>,
     pub environment: Option<Environment>,
     pub warnings: Vec<Fault>,
 }
@@ -54,6 +57,7 @@ pub(super) fn read_scene(root: &Item<'_>, accessors: &Accessors<'_>, meshes: &[M
     };
     let mut tree =
         Tree { environment: scene.map(read_environment).transpose()?.flatten(), ..Tree::default() };
+    tree.part_of_node = vec![None; nodes.len()];
     let mut stack: Vec<(usize, Option<u32>)> = roots.iter().rev().map(|&n| (n, None)).collect();
     let mut seen = vec![false; nodes.len()];
     while let Some((index, parent)) = stack.pop() {
@@ -64,6 +68,9 @@ pub(super) fn read_scene(root: &Item<'_>, accessors: &Accessors<'_>, meshes: &[M
             return Err(item.fault("the scene names it twice"));
         }
         let part = tree.parts.len() as u32;
+        if let Some(place) = tree.part_of_node.get_mut(index) {
+            *place = Some(part);
+        }
         reader.read_node(item, parent, &mut tree)?;
         let below = children.get(index).into_iter().flatten().rev();
         stack.extend(below.map(|&child| (child, Some(part))));
@@ -129,6 +136,12 @@ impl Reader<'_> {
             _ => None,
         };
         let local = read_local(item, &mut tree.warnings)?;
+        let target_count =
+            mesh.and_then(|mesh| self.meshes.get(mesh.0 as usize)).map(|mesh| mesh.data.morph.len());
+        let weights = match target_count {
+            Some(count) if count > 0 => read_weights(item, count, &mut tree.warnings)?,
+            _ => None,
+        };
         tree.parts.push(PartNode {
             name: item.name()?,
             parent,
@@ -137,6 +150,8 @@ impl Reader<'_> {
             mesh: mesh.filter(|_| instances.is_none()),
             light,
             camera,
+            skin: None,
+            weights: weights.clone(),
         });
         for local in instances.into_iter().flatten() {
             tree.parts.push(PartNode {
@@ -144,6 +159,7 @@ impl Reader<'_> {
                 local: local.into(),
                 visible: true,
                 mesh,
+                weights: weights.clone(),
                 ..PartNode::default()
             });
         }

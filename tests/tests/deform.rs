@@ -201,7 +201,7 @@ fn a_new_pose_is_seen_in_the_next_frame_and_the_old_one_comes_back() {
 }
 
 #[test]
-fn a_pose_uploads_its_joints_and_nothing_of_the_mesh() {
+fn a_pose_uploads_its_joints_and_refits_one_tree() {
     let mesh = Arc::new(bar());
     let (scene, ids, camera) = row(&[(&mesh, None)]);
     let mut studio = Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, camera);
@@ -209,7 +209,9 @@ fn a_pose_uploads_its_joints_and_nothing_of_the_mesh() {
     let idle = studio.statistics().uploaded_bytes;
     for step in 0..6 {
         studio.frame(&pose_delta(ids[0], bent(0.1 * step as f32, 1.0)));
-        let bytes = studio.statistics().uploaded_bytes - idle;
+        let figures = studio.statistics();
+        assert_eq!((figures.acceleration.blas_built, figures.acceleration.blas_refit), (0, 1), "step {step}");
+        let bytes = figures.uploaded_bytes - idle;
         // The joints, a job, an instance number or two, and in the first of these frames a geometry record.
         assert!(bytes < 512, "step {step}: {bytes} bytes, of a mesh of {}", mesh.positions.len() * 64);
     }
@@ -384,6 +386,16 @@ fn a_mesh_may_start_and_stop_to_deform() {
     assert_eq!(studio.mean(2).mean, at_rest.mean);
     // All at once: mesh and pose in one delta.
     studio.frame(&posed.delta);
+    assert_eq!(studio.mean(2).mean, bent_bar.mean);
+    // The mesh with another joint, and the pose that fits it alone.
+    let mut jointed = bar();
+    if let Some(deformation) = &mut jointed.deformation {
+        deformation.joint_count = 3;
+    }
+    let mut pose = bent(0.7, 1.0);
+    pose.joints.push(Affine3A::ZERO);
+    let jointed = replace(&Arc::new(jointed));
+    studio.frame(&SceneDelta { poses: vec![(ids[0], pose)], ..jointed });
     assert_eq!(studio.mean(2).mean, bent_bar.mean);
     studio.frame(&SceneDelta { removed_instances: ids, ..replace(&mesh) });
     studio.frames(2);

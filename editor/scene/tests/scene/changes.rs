@@ -151,6 +151,25 @@ fn a_new_target_is_told_whole_and_once() {
 }
 
 #[test]
+fn what_comes_back_is_told_whole_and_not_in_parts() {
+    let Some((mut document, part, _)) = morphed() else { return };
+    let material = document.renderable(part).unwrap().materials[0];
+    for edit in [
+        Edit::SetMorphWeights { target: part, weights: vec![0.5, 0.0] },
+        Edit::SetRayVisibility { target: part, camera_visible: false, casts_shadows: true },
+        Edit::AssignMaterial { target: part, primitive: 0, material },
+    ] {
+        document.apply(edit).unwrap();
+    }
+    let undo = document.apply(Edit::RemoveNode { node: part.node }).unwrap();
+    document.apply(undo).unwrap();
+    assert_told(
+        &mut document,
+        ChangeSet { added: map([(part, MESH)]), structure: true, ..ChangeSet::default() },
+    );
+}
+
+#[test]
 fn a_new_mesh_swallows_the_moves_of_its_primitives() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = scene(folder.path());

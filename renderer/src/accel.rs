@@ -6,6 +6,7 @@ mod blas;
 mod build;
 mod order;
 mod policy;
+mod surface;
 mod tlas;
 
 use std::sync::Arc;
@@ -16,7 +17,7 @@ use glam::Vec3;
 use crate::delta::MeshId;
 use crate::error::Result;
 use crate::measure::AccelStatistics;
-use crate::passes::InstanceDescriptors;
+use crate::passes::ScenePasses;
 use crate::tables::{Changed, Download, Tables};
 
 use background::{Adopted, Later};
@@ -24,6 +25,7 @@ use blas::{BlasKey, BlasTable, Built, Form};
 use build::{Job, Scratch, job_of};
 pub use policy::AccelPolicy;
 use policy::{Change, SURFACE_LIMIT, change_of, stretch};
+use surface::Surfaces;
 use tlas::{Dirty, Tlas};
 
 /// All acceleration structures of the scene.
@@ -33,6 +35,7 @@ pub(crate) struct Accel {
     blases: BlasTable,
     tlas: Tlas,
     later: Later,
+    surfaces: Surfaces,
     scratch: Scratch,
     groups: tlas::Groups,
     /// Updates so far.
@@ -55,6 +58,7 @@ impl Accel {
             blases: BlasTable::new(device),
             tlas: Tlas::new(device),
             later: Later::new(device)?,
+            surfaces: Surfaces::new(device),
             scratch: Scratch::new(device),
             groups,
             frame: 0,
@@ -72,23 +76,26 @@ impl Accel {
         recorder: &mut Recorder,
         tables: &Tables,
         changed: &Changed,
-        pass: &InstanceDescriptors,
+        passes: &ScenePasses,
     ) -> Result<bool> {
         self.frame += 1;
         self.statistics.forget_frame();
         let mut dirty = Dirty::default();
         self.follow(tables, changed, &mut dirty);
+        self.blases.decayed.extend(self.surfaces.read(self.frame));
         let adopted = self.later.step(&mut self.blases, &self.policy)?;
         let jobs = self.plan(tables, changed, &adopted)?;
         dirty.bounds = !jobs.is_empty();
         dirty.addresses = !adopted.swapped.is_empty();
         self.build(recorder, tables, jobs, &mut dirty)?;
+        self.surfaces.record(recorder, tables, &self.blases, &passes.blas_surface, self.frame)?;
         if adopted.appeared {
             // An instance that waited for its BLAS becomes active: its record names a structure now.
             dirty.slots = (0..tables.instances.slot_count()).collect();
         }
         if !dirty.is_empty() || !self.tlas.exists() {
             let (policy, scratch, groups) = (&self.policy, &mut self.scratch, self.groups);
+            let pass = &passes.instance_descriptors;
             self.statistics.tlas =
                 self.tlas.update(recorder, tables, &mut self.blases, dirty, policy, pass, scratch, groups)?;
         }
@@ -112,6 +119,9 @@ impl Accel {
             }
         }
         self.blases.tidy();
+        if dirty.reused > 0 {
+            self.surfaces.tidy();
+        }
         dirty.slots.retain(|slot| *slot < count);
         for mesh in &changed.meshes {
             for number in self.blases.of_mesh(*mesh) {
@@ -209,12 +219,16 @@ impl Accel {
         let (scratch, group) = (&mut self.scratch, self.groups.blas);
         recorder.pass("accel.blas", |recorder| build::record(recorder, tables, &jobs, scratch, group))?;
         for job in jobs {
-            if job.mode == BuildMode::Refit {
+            let Some(blas) = self.blases.get(job.number) else { continue };
+            let refit = job.mode == BuildMode::Refit;
+            if self.policy.refit && blas.key.deforming.is_some() {
+                self.surfaces.note(job.number, &job.structure, refit);
+            }
+            if refit {
                 self.statistics.blas_refit += 1;
                 continue;
             }
             self.statistics.blas_built += 1;
-            let Some(blas) = self.blases.get(job.number) else { continue };
             // A structure of its own: descriptors name another address, and what was inactive may be active.
             let in_place =
                 blas.built.as_ref().is_some_and(|built| Arc::ptr_eq(&built.structure, &job.structure));

@@ -390,6 +390,18 @@ twins! {
         8 weights: [f32; 4],
     }
 
+    /// One geometry of a BLAS whose surface is measured.
+    struct SurfaceJob, size 24 {
+        /// Its [`Geometry`].
+        0 geometry: u64,
+        /// `f32` a cluster: square metres, mesh space.
+        8 surfaces: u64,
+        /// Number of clusters of [`CLUSTER_TRIANGLES`].
+        16 cluster_count: u32,
+        /// Zero.
+        20 pad0: u32,
+    }
+
     /// Which instance descriptors are written.
     struct InstanceDescriptorJob, size 48 {
         /// [`Instance`] by slot.

@@ -2,6 +2,7 @@
 //! This file holds what they share: how pipelines are built, and what a pass may touch.
 
 mod accumulate;
+mod blas_surface;
 mod deform;
 mod gbuffer;
 mod instance_descriptors;
@@ -19,6 +20,7 @@ use caustica_gpu::{
 };
 
 pub(crate) use accumulate::Accumulate;
+pub(crate) use blas_surface::BlasSurface;
 pub(crate) use deform::Deform;
 pub(crate) use gbuffer::GBuffer;
 pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
@@ -174,6 +176,7 @@ impl Scope<'_> {
 
 /// The passes that bring the scene itself up to date, whatever the views show.
 pub(crate) struct ScenePasses {
+    pub(crate) blas_surface: BlasSurface,
     pub(crate) deform: Deform,
     pub(crate) instance_descriptors: InstanceDescriptors,
 }
@@ -181,6 +184,7 @@ pub(crate) struct ScenePasses {
 impl ScenePasses {
     pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
         Ok(Self {
+            blas_surface: BlasSurface::new(device, library)?,
             deform: Deform::new(device, library)?,
             instance_descriptors: InstanceDescriptors::new(device, library)?,
         })

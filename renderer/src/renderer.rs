@@ -119,7 +119,7 @@ impl Renderer {
             self.changed = Changed { all: true, ..changed };
             return Err(error);
         }
-        match self.accel.update(recorder, &self.tables, &changed, &self.scene_passes.instance_descriptors) {
+        match self.accel.update(recorder, &self.tables, &changed, &self.scene_passes) {
             Ok(true) => self.invalidate(Invalidation::Scene, "built what was pending"),
             Ok(false) => {}
             Err(error) => {

@@ -6,6 +6,7 @@ use std::fmt;
 
 use glam::DAffine3;
 
+use crate::animation::ClipChoice;
 use crate::assets::{AlphaMode, Material, Mesh};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
@@ -123,12 +124,21 @@ impl Audit<'_> {
             self.add(Severity::Error, Subject::Prefab(id), &prefab.name, message);
         }
         for (id, node) in self.document.nodes() {
-            let NodeKind::Prefab { prefab, overrides, .. } = &node.kind else {
+            let NodeKind::Prefab { prefab, overrides, clip } = &node.kind else {
                 continue;
             };
             let Some(prefab) = self.document.prefab(*prefab).filter(|p| !p.missing) else {
                 continue;
             };
+            if let ClipChoice::Clip(index) = *clip
+                && clip.of(&prefab.animations).is_empty()
+            {
+                let count = prefab.animations.len();
+                let message = format!(
+                    "it stands still: it is to play clip {index}, the source has {count}; choose another"
+                );
+                self.add(Severity::Warning, Subject::Target(Target::node(id)), &node.name, message);
+            }
             let lost = overrides.keys().filter(|path| prefab.part_at(path).is_none());
             let lost: Vec<&str> = lost.map(|path| path.0.as_str()).collect();
             if !lost.is_empty() {
@@ -351,6 +361,16 @@ mod tests {
         assert!(messages(&nan)[0].contains("1 positions are not finite"));
         let line = with_triangle(DVec3::ONE, Vec3::X * 2.0);
         assert!(messages(&line)[0].contains("no area"));
+    }
+
+    #[test]
+    fn a_clip_that_is_not_there_is_found() {
+        let mut document = with_triangle(DVec3::ONE, Vec3::Y);
+        let (node, _) = document.nodes().next().unwrap();
+        document.apply(Edit::SetClip { node, clip: ClipChoice::Clip(2) }).unwrap();
+        assert!(messages(&document)[0].contains("clip 2, the source has 0"));
+        document.apply(Edit::SetClip { node, clip: ClipChoice::All }).unwrap();
+        assert_eq!(messages(&document), [""; 0]);
     }
 
     #[test]

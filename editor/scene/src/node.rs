@@ -32,7 +32,7 @@ pub struct Node {
 
 /// Which rays meet a placed mesh, as Blender's ray visibility.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase")]
+#[serde(rename_all = "camelCase", default)]
 pub struct RayVisibility {
     /// The camera sees it. False: only mirrors, glass and shadows tell of it.
     pub camera_visible: bool,

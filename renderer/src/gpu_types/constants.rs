@@ -93,6 +93,9 @@ pub const SHOW_MATERIAL: u32 = 12;
 /// Debug view: source_uint = id target.
 pub const SHOW_TRIANGLE: u32 = 13;
 
+/// Triangles of one cluster of pass `blas_surface`.
+pub const CLUSTER_TRIANGLES: u32 = 32;
+
 /// [`super::TlasSlot::blas`]: rays never meet the instance.
 pub const TLAS_NO_BLAS: u32 = 0xffff_ffff;
 

@@ -241,6 +241,9 @@ fn update_parts(
         if replace_at(&mut parts.shown, index, shown) {
             changes.target_shown(target, content);
         }
+        if parts.in_instance.is_empty() {
+            continue;
+        }
         let in_parent = above.and_then(|p| parts.in_instance.get(p).copied()).unwrap_or(DAffine3::IDENTITY);
         if replace_at(&mut parts.in_instance, index, in_parent * local) {
             bent.extend(prefab.bent_by(index));

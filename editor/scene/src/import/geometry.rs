@@ -8,8 +8,12 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
 use super::tangents;
-use crate::assets::{Mesh, MeshData, MorphTarget, Primitive, SkinData};
+use crate::assets::{Mesh, MeshData, Primitive};
 use crate::ids::MaterialId;
+
+mod deform;
+
+pub(super) use deform::{Deltas, Hold};
 
 /// Sine squared between two edges below which a triangle has no area.
 const NO_AREA_SIN2: f64 = 1e-26;
@@ -24,17 +28,9 @@ pub(super) struct Attributes {
     pub tex_coords1: Option<Vec<Vec2>>,
     pub colors: Option<Vec<Vec4>>,
     /// Joints with their weights, as [`SkinData`] wants them.
-    pub skin: Option<Vec<([u16; 4], [f32; 4])>>,
+    pub skin: Option<Vec<Hold>>,
     /// What the morph targets add.
     pub targets: Vec<Deltas>,
-}
-
-/// What one morph target adds; each list is as long as the positions.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Deltas {
-    pub positions: Option<Vec<Vec3>>,
-    pub normals: Option<Vec<Vec3>>,
-    pub tangents: Option<Vec<Vec3>>,
 }
 
 /// What was repaired or left out.
@@ -118,16 +114,7 @@ impl MeshBuilder {
         } else {
             self.data.colors.clear();
         }
-        if let Some(skin) = &mut self.data.skin {
-            skin.joints.resize(count, [0; 4]);
-            skin.weights.resize(count, [0.0; 4]);
-        }
-        for target in &mut self.data.morph {
-            for deltas in [&mut target.positions, &mut target.normals, &mut target.tangents] {
-                let wanted = if deltas.is_empty() { 0 } else { count };
-                deltas.resize(wanted, Vec3::ZERO);
-            }
-        }
+        deform::fill_up(&mut self.data);
         Mesh::new(name, Arc::new(self.data), self.primitives)
     }
 
@@ -234,8 +221,8 @@ impl MeshBuilder {
             data.colors.push(if color.is_finite() { color } else { Vec4::ONE });
         }
         data.colors.resize(end, Vec4::ONE);
-        append_skin(data, new, base);
-        append_targets(data, new, base, bad);
+        deform::append_skin(data, new, base);
+        deform::append_targets(data, new, base, bad);
         self.has_tex_coords1 |= new.tex_coords1.is_some();
         self.has_colors |= new.colors.is_some();
         Ok(base as u32)
@@ -282,42 +269,6 @@ pub(crate) fn has_no_area(p: Vec3, q: Vec3, r: Vec3) -> bool {
         return true;
     }
     (a * scale).cross(b * scale).length_squared() <= NO_AREA_SIN2
-}
-
-/// Vertices of earlier primitives without joints are held by none.
-fn append_skin(data: &mut MeshData, new: &Attributes, base: usize) {
-    let Some(entries) = &new.skin else {
-        return;
-    };
-    let SkinData { joints, weights } = data.skin.get_or_insert_default();
-    joints.resize(base, [0; 4]);
-    weights.resize(base, [0.0; 4]);
-    joints.extend(entries.iter().map(|(joints, _)| joints));
-    weights.extend(entries.iter().map(|(_, weights)| weights));
-}
-
-/// Deltas stay as short as nobody has any; then they begin with zeros.
-fn append_targets(data: &mut MeshData, new: &Attributes, base: usize, bad: &mut usize) {
-    if data.morph.len() < new.targets.len() {
-        data.morph.resize_with(new.targets.len(), MorphTarget::default);
-    }
-    for (target, deltas) in data.morph.iter_mut().zip(&new.targets) {
-        for (to, from) in [
-            (&mut target.positions, &deltas.positions),
-            (&mut target.normals, &deltas.normals),
-            // Without tangents of its own the base has others than those that the file's deltas go with.
-            (&mut target.tangents, if new.tangents.is_some() { &deltas.tangents } else { &None }),
-        ] {
-            let Some(from) = from else {
-                continue;
-            };
-            to.resize(base, Vec3::ZERO);
-            for &delta in from {
-                *bad += usize::from(!delta.is_finite());
-                to.push(if delta.is_finite() { delta } else { Vec3::ZERO });
-            }
-        }
-    }
 }
 
 fn extend_vec2(to: &mut Vec<Vec2>, from: Option<&[Vec2]>, base: usize, end: usize, bad: &mut usize) {
@@ -375,18 +326,13 @@ fn compacted(attributes: &Attributes, indices: &[u32]) -> (Attributes, Vec<u32>)
 /// normals they are flat, and tangents of the file are ignored).
 fn flat_normals(attributes: &Attributes, indices: &[u32]) -> (Attributes, Vec<u32>) {
     let mut own = gathered(attributes, indices);
-    let (triangles, _) = own.positions.as_chunks::<3>();
     let flat = |triangle: [Vec3; 3]| face_normal(triangle).normalize_or(DVec3::Z).as_vec3();
-    let normals: Vec<Vec3> = triangles.iter().flat_map(|&triangle| [flat(triangle); 3]).collect();
-    // A morphed face has a flat normal of its own.
-    for target in &mut own.targets {
-        target.normals = target.positions.as_ref().map(|deltas| {
-            let moved: Vec<Vec3> = own.positions.iter().zip(deltas).map(|(&p, &d)| p + d).collect();
-            let (moved, _) = moved.as_chunks::<3>();
-            let moved_normals = moved.iter().flat_map(|&triangle| [flat(triangle); 3]);
-            moved_normals.zip(&normals).map(|(moved, &normal)| moved - normal).collect()
-        });
-    }
+    let normals_of = |positions: &[Vec3]| -> Vec<Vec3> {
+        let (triangles, _) = positions.as_chunks::<3>();
+        triangles.iter().flat_map(|&triangle| [flat(triangle); 3]).collect()
+    };
+    let normals = normals_of(&own.positions);
+    deform::flatten(&mut own, &normals, normals_of);
     own.normals = Some(normals);
     own.tangents = None;
     let indices = (0..own.positions.len() as u32).collect();

@@ -113,9 +113,14 @@ fn boxes_hold_every_bent_vertex() {
         );
         document.apply(Edit::SetPrimitiveTransform { mesh, primitive: 0, mesh_from_primitive }).unwrap();
         let duration_s = document.animation_duration().unwrap();
+        let target = document.renderables().next().unwrap().target;
+        if document.morph_weights(target).is_some() {
+            let weights = vec![-1.5, 0.25];
+            document.apply(Edit::SetMorphWeights { target, weights }).unwrap();
+        }
         for step in 0..=16 {
-            document.set_time(Some(duration_s * f64::from(step) / 16.0));
-            let target = document.renderables().next().unwrap().target;
+            // At first the weights from above, then those of the clip.
+            document.set_time((step > 0).then_some(duration_s * f64::from(step) / 16.0));
             let (low, high) = document.own_bounds(target).unwrap();
             let size = (high - low).length();
             let world_from_mesh = document.world_from_mesh(target).unwrap();

@@ -8,15 +8,14 @@ use caustica_scene::{
 };
 use glam::{DQuat, DVec3, Vec3, Vec4};
 
-/// The folder of the shared assets, or `None` with a note.
+/// A folder or file of the shared assets, or `None` with a note.
 pub fn assets(part: &str) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets");
-    let folder = root.join(part);
-    if folder.exists() {
-        return Some(folder);
+    let path = root.join(part).canonicalize();
+    if path.is_err() {
+        println!("skipped: {part} is absent from {}", root.display());
     }
-    println!("skipped: {} is absent", folder.display());
-    None
+    path.ok()
 }
 
 /// A generator that gives the same numbers everywhere (Knuth's MMIX constants).

@@ -2,8 +2,8 @@
 
 use crate::common::{ARM, LAMP, PLATE, Scene, scene, trs};
 use caustica_scene::{
-    Camera, Edit, EditError, Environment, Light, LightKind, Local, Material, MaterialEntry, MaterialId,
-    MeshId, Node, NodeId, NodeKind, OverrideField, Subtree, Target, Trs,
+    Camera, ClipChoice, Edit, EditError, Environment, Light, LightKind, Local, Material, MaterialEntry,
+    MaterialId, MeshId, Node, NodeId, NodeKind, OverrideField, Subtree, Target, Trs,
 };
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -62,8 +62,10 @@ fn every_edit(scene: &mut Scene) -> Vec<Edit> {
             ],
         ),
         duplicate,
+        Edit::SetClip { node: first, clip: ClipChoice::All },
     ];
     for target in [Target::node(first), plate, Target::part(first, ARM)] {
+        edits.push(Edit::SetRayVisibility { target, camera_visible: false, casts_shadows: true });
         edits.push(Edit::SetTransform { target, local: trs(4.0, 0.7, 3.0) });
         edits.push(Edit::SetVisible { target, visible: false });
     }
@@ -73,6 +75,7 @@ fn every_edit(scene: &mut Scene) -> Vec<Edit> {
         OverrideField::Visible,
         OverrideField::Material(1),
         OverrideField::Camera,
+        OverrideField::RayVisibility,
         OverrideField::All,
     ] {
         let reset = Edit::ResetOverride { target: plate, field };
@@ -95,6 +98,7 @@ fn every_edit_is_undone_and_redone_exactly() {
                 let on_part = matches!(edit, Edit::Rename { target, .. }
                     | Edit::SetTransform { target, .. } | Edit::SetVisible { target, .. }
                     | Edit::SetCamera { target, .. } | Edit::AssignMaterial { target, .. }
+                    | Edit::SetRayVisibility { target, .. }
                     if target.part.is_some());
                 if on_part {
                     document.apply(edit.clone()).unwrap();

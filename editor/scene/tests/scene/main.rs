@@ -15,6 +15,7 @@ mod gltf_file;
 mod import;
 mod oracle;
 mod projects;
+mod rig_damage;
 mod rig_import;
 mod speed;
 mod transforms;

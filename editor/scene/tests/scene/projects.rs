@@ -1,9 +1,10 @@
 //! Projects: what is saved comes back equal, the bytes are the same every time, nothing is lost.
 
+use crate::animation::morphed;
 use crate::common::{ARM, LAMP, PLATE, Scene, scene, trs};
 use caustica_scene::{
-    Edit, Environment, Local, Material, MaterialEntry, MaterialId, Project, ProjectMeta, ProjectProblem,
-    Target, Trs,
+    ClipChoice, Edit, Environment, Local, Material, MaterialEntry, MaterialId, Project, ProjectMeta,
+    ProjectProblem, Target, Trs,
 };
 use glam::{DAffine3, DVec3, Vec3};
 use serde_json::{Value, json};
@@ -40,6 +41,9 @@ fn edited(folder: &std::path::Path) -> Scene {
         },
         Edit::SetEnvironment(Environment::Constant(Vec3::new(0.1, 0.2, 0.3))),
         Edit::SetDefaultCamera(Some(plate)),
+        Edit::SetClip { node: scene.second, clip: ClipChoice::Clip(3) },
+        Edit::SetRayVisibility { target: plate, camera_visible: false, casts_shadows: true },
+        Edit::SetRayVisibility { target: scene.second.into(), camera_visible: true, casts_shadows: false },
     ] {
         scene.document.apply(edit).unwrap();
     }
@@ -72,6 +76,44 @@ fn a_saved_project_comes_back_equal_and_gives_the_same_bytes() {
     assert!(text.contains("\"source\": \"model.gltf\""), "{text}");
     // Single precision is written short.
     assert!(text.contains("0.1,") && !text.contains("0.10000000149"), "{text}");
+}
+
+#[test]
+fn morph_weights_are_saved_and_a_time_is_not() {
+    let Some((mut document, part, own)) = morphed() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.caustica");
+    for (target, weights) in [(part, vec![0.1, 0.7]), (own, vec![0.3, 0.0])] {
+        document.apply(Edit::SetMorphWeights { target, weights }).unwrap();
+    }
+    document.set_time(Some(0.3));
+    Project::save(&path, &document, &meta()).unwrap();
+    let project = Project::load(&path).unwrap();
+    assert!(project.warnings.is_empty(), "{:?}", project.warnings);
+    assert!(project.document == document);
+    assert_eq!(project.document.time(), None);
+    let weights = |target| project.document.deform_pose(target).unwrap().weights;
+    assert_eq!((weights(part), weights(own)), (vec![0.1, 0.7], vec![0.3, 0.0]));
+}
+
+#[test]
+fn what_was_not_touched_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.caustica");
+    Project::save(&path, &scene(folder.path()).document, &meta()).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    for key in ["clip", "rayVisibility", "weights", "overrides", "visible"] {
+        assert!(!text.contains(key), "{key}: {text}");
+    }
+    // One of the two fields is enough in a file written by hand.
+    let text = text.replace(
+        "\"name\": \"Second\"",
+        "\"name\": \"Second\", \"rayVisibility\": {\"castsShadows\": false}",
+    );
+    std::fs::write(&path, text).unwrap();
+    let document = Project::load(&path).unwrap().document;
+    let (_, second) = document.nodes().find(|(_, node)| node.name == "Second").unwrap();
+    assert!(second.ray_visibility.camera_visible && !second.ray_visibility.casts_shadows);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::super::geometry::{Attributes, Deltas};
+use super::super::geometry::{Attributes, Deltas, Hold};
 use super::accessor::{Accessor, Accessors, Component};
 use super::json::{Fault, Item};
 
@@ -114,7 +114,7 @@ impl<'a> AttributeReader<'a> {
         sets: &[(String, String)],
         count: usize,
         warnings: &mut Vec<Fault>,
-    ) -> Result<Vec<([u16; 4], [f32; 4])>, Fault> {
+    ) -> Result<Vec<Hold>, Fault> {
         let mut holds: Vec<Vec<(u32, f32)>> = vec![Vec::new(); count];
         let mut repaired = 0_usize;
         for (joints_name, weights_name) in sets {
@@ -250,7 +250,7 @@ fn key_of(base: &Item<'_>, targets: &[Item<'_>], sets: &[(String, String)]) -> R
 }
 
 /// At most four holds, their weights made a sum of 1; all zero when there are none.
-fn strongest(mut holds: Vec<(u32, f32)>) -> ([u16; 4], [f32; 4]) {
+fn strongest(mut holds: Vec<(u32, f32)>) -> Hold {
     // Stable, so that equally strong ones keep the order of the file.
     holds.sort_by(|(_, a), (_, b)| b.total_cmp(a));
     holds.truncate(4);

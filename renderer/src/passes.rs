@@ -9,6 +9,7 @@ mod instance_descriptors;
 mod post;
 mod shading;
 mod shadow;
+mod shape_boxes;
 mod temporal;
 
 use std::ops::Range;
@@ -27,13 +28,13 @@ pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
 pub(crate) use post::Post;
 pub(crate) use shading::Shading;
 pub(crate) use shadow::Shadow;
+pub(crate) use shape_boxes::ShapeBoxes;
 pub(crate) use temporal::Temporal;
 
 use crate::accel::Accel;
 use crate::error::Result;
 use crate::gpu_types::Push;
 use crate::needs::Needs;
-use crate::settings::Pipeline;
 use crate::shader::{ShaderLibrary, merge_interfaces};
 use crate::tables::Tables;
 
@@ -74,23 +75,43 @@ impl Builder<'_> {
         } else {
             None
         };
+        let shapes = if self.needs.shapes {
+            Some((
+                self.library.stage("passes/rays/shape.rint")?,
+                self.library.stage("passes/rays/shape.rchit")?,
+            ))
+        } else {
+            None
+        };
         let mut stages = vec![&*generation, &*surface_hit, &*surface_miss, &*shadow_miss];
         if let Some((surface, shadow)) = &any_hits {
             stages.extend([&**surface, &**shadow]);
+        }
+        if let Some((intersection, hit)) = &shapes {
+            stages.extend([&**intersection, &**hit]);
         }
         let interface = merge_interfaces(&stages)?;
         let (surface_any, shadow_any) = match &any_hits {
             Some((surface, shadow)) => (Some(&surface.module), Some(&shadow.module)),
             None => (None, None),
         };
+        // In the order of RAY_SURFACE and RAY_SHADOW; then the same for shapes (RAY_SHAPES).
+        let mut hit_groups = vec![
+            HitGroup { closest_hit: Some(&surface_hit.module), any_hit: surface_any, intersection: None },
+            HitGroup { closest_hit: None, any_hit: shadow_any, intersection: None },
+        ];
+        if let Some((intersection, hit)) = &shapes {
+            let intersection = Some(&intersection.module);
+            hit_groups.extend([
+                HitGroup { closest_hit: Some(&hit.module), any_hit: surface_any, intersection },
+                HitGroup { closest_hit: None, any_hit: shadow_any, intersection },
+            ]);
+        }
         let desc = RayTracingDesc {
             name: label,
             ray_generation: &generation.module,
             misses: &[&surface_miss.module, &shadow_miss.module],
-            hit_groups: &[
-                HitGroup { closest_hit: Some(&surface_hit.module), any_hit: surface_any, intersection: None },
-                HitGroup { closest_hit: None, any_hit: shadow_any, intersection: None },
-            ],
+            hit_groups: &hit_groups,
         };
         Ok(RayTracingPipeline::new(self.device, &desc, &interface, &self.specialization, Some(self.set))?)
     }
@@ -179,6 +200,7 @@ pub(crate) struct ScenePasses {
     pub(crate) blas_surface: BlasSurface,
     pub(crate) deform: Deform,
     pub(crate) instance_descriptors: InstanceDescriptors,
+    pub(crate) shape_boxes: ShapeBoxes,
 }
 
 impl ScenePasses {
@@ -187,6 +209,7 @@ impl ScenePasses {
             blas_surface: BlasSurface::new(device, library)?,
             deform: Deform::new(device, library)?,
             instance_descriptors: InstanceDescriptors::new(device, library)?,
+            shape_boxes: ShapeBoxes::new(device, library)?,
         })
     }
 }
@@ -202,10 +225,10 @@ pub(crate) struct PassSet {
 }
 
 impl PassSet {
-    pub(crate) fn new(builder: &mut Builder<'_>, pipeline: Pipeline) -> Result<Self> {
+    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
         let needs = builder.needs;
         Ok(Self {
-            gbuffer: GBuffer::new(builder, pipeline)?,
+            gbuffer: GBuffer::new(builder)?,
             shadow: needs.direct_light().then(|| Shadow::new(builder)).transpose()?,
             temporal: (needs.temporal && needs.direct_light()).then(|| Temporal::new(builder)).transpose()?,
             shading: Shading::new(builder)?,

@@ -55,7 +55,7 @@ enum Made {
 impl Made {
     fn ball(self, radius: f32) -> Mesh {
         match self {
-            Self::Triangles => sphere(radius, 512),
+            Self::Triangles => sphere(radius, 256),
             Self::Shapes => mesh_of(&[ball(radius)]),
         }
     }
@@ -88,6 +88,21 @@ fn mean_of(image: &Accumulated) -> f32 {
     image.mean.iter().flatten().sum::<f32>() / (3.0 * image.mean.len() as f32)
 }
 
+/// Scenes shown one after the other by one renderer: meshes of triangles and of shapes take each other's place, and
+/// pipelines are made once.
+#[derive(Default)]
+struct Stage(Option<Studio>);
+
+impl Stage {
+    fn mean(&mut self, settings: ViewSettings, scene: &Scene, camera: Camera, samples: u64) -> Accumulated {
+        let make = || Studio::of(EXTENT, settings.clone(), &SceneDelta::default(), camera);
+        let studio = self.0.get_or_insert_with(make);
+        studio.set(|now| *now = settings.clone());
+        studio.restage(&scene.delta, camera);
+        studio.mean(samples)
+    }
+}
+
 /// A floor and a mirror, on which things of `made` stand under a hard lamp.
 fn room(made: Made) -> (Scene, Camera) {
     let mut scene = Scene::new();
@@ -115,7 +130,7 @@ fn shapes_look_like_fine_triangle_meshes() {
         assert!(mean_of(&fine) > 0.05);
         // Outlines, edges of shadows and of checks, and their mirror images, may fall to the next pixel.
         let count = differing(&fine, &shapes, 0.01);
-        assert!(count <= 40, "{}: {count} pixels differ", pipeline.name());
+        assert!(count <= 20, "{}: {count} pixels differ", pipeline.name());
     }
 }
 
@@ -142,7 +157,7 @@ fn textures_lie_on_shapes_as_on_triangles() {
             studio.frames(1);
             studio.display()
         };
-        let triangles = image(sphere(0.6, 512), quad(1.0, 1.0), at(0.7, 0.0, 0.5));
+        let triangles = image(sphere(0.6, 256), quad(1.0, 1.0), at(0.7, 0.0, 0.5));
         let shapes = image(mesh_of(&[ball(0.6)]), mesh_of(&[block(1.0)]), at(0.7, 0.0, 0.0));
         let far = |a: &[f32; 4], b: &[f32; 4]| a.iter().zip(b).any(|(x, y)| (x - y).abs() > 0.02);
         let count = triangles.iter().zip(&shapes).filter(|(a, b)| far(a, b)).count();
@@ -155,8 +170,9 @@ fn textures_lie_on_shapes_as_on_triangles() {
 #[test]
 fn from_inside_the_far_side_is_seen() {
     let both = Material { double_sided: true, ..lambert(0.6) };
+    let mut stage = Stage::default();
     for pipeline in RAYS {
-        let image = |made: Made, as_box: bool, material: &Material| {
+        let mut image = |made: Made, as_box: bool, material: &Material| {
             let mut scene = Scene::new();
             let mesh = if as_box { made.cube(3.0) } else { made.ball(1.5) };
             scene.put(mesh, material.clone(), at(0.1, 0.2, 0.0) * Affine3A::from_rotation_y(0.4));
@@ -164,13 +180,13 @@ fn from_inside_the_far_side_is_seen() {
             scene.surround(0.25);
             let camera = camera_at(Vec3::new(0.0, 0.1, 0.8), Vec3::new(0.2, 0.0, -1.0), 0.9);
             let settings = ViewSettings { light_samples: 1, ..still(pipeline) };
-            Studio::of(EXTENT, settings, &scene.delta, camera).mean(1)
+            stage.mean(settings, &scene, camera, 1)
         };
         for as_box in [false, true] {
             let (fine, shape) = (image(Made::Triangles, as_box, &both), image(Made::Shapes, as_box, &both));
             assert!(mean_of(&shape) > 0.03);
             let count = differing(&fine, &shape, 0.01);
-            assert!(count <= 20, "{}, box {as_box}: {count} pixels differ", pipeline.name());
+            assert!(count <= 6, "{}, box {as_box}: {count} pixels differ", pipeline.name());
             // The back of a single-sided surface is not seen: the surroundings are.
             let single = image(Made::Shapes, as_box, &lambert(0.6));
             assert!(single.mean.iter().flatten().all(|x| *x == 0.25), "{}", pipeline.name());
@@ -205,7 +221,7 @@ fn glass_shapes_bend_and_tint_light_as_glass_triangles_do() {
         let (a, b) = (mean_of(&fine), mean_of(&shapes));
         assert!((a - b).abs() < 2e-3 * a, "{}: {a} and {b}", pipeline.name());
         let count = differing(&fine, &shapes, 0.05);
-        assert!(count <= 160, "{}: {count} pixels differ", pipeline.name());
+        assert!(count <= 20, "{}: {count} pixels differ", pipeline.name());
     }
 }
 
@@ -236,8 +252,9 @@ fn nothing_is_lost_or_gained_in_a_furnace_of_shapes() {
 #[test]
 fn holes_and_thin_coats_are_those_of_triangles() {
     // Masked: holes by texture. Blended: either side of a shape is met or passed by itself, so a quarter is seen through.
+    let mut stage = Stage::default();
     for pipeline in RAYS {
-        let image = |made: Made, alpha: AlphaMode| {
+        let mut image = |made: Made, alpha: AlphaMode| {
             let mut scene = Scene::new();
             let mut paint = checker(8, 0, 255);
             paint.rgba8 = paint.rgba8.chunks_exact(4).flat_map(|t| [200, 180, 160, t[0] / 2 + 64]).collect();
@@ -252,14 +269,17 @@ fn holes_and_thin_coats_are_those_of_triangles() {
             scene.put(quad(8.0, 8.0), lambert(0.6), at(0.0, 0.0, -1.5));
             scene.light(point_light(Vec3::new(1.0, 1.0, 4.0), 20.0));
             let camera = camera_parallel(1.2, 1.2);
-            Studio::of(EXTENT, still(pipeline), &scene.delta, camera).mean(256)
+            stage.mean(still(pipeline), &scene, camera, 64)
         };
         for alpha in [AlphaMode::Mask { cutoff: 0.5 }, AlphaMode::Blend] {
             let (fine, shapes) = (image(Made::Triangles, alpha), image(Made::Shapes, alpha));
             let (a, b) = (mean_of(&fine), mean_of(&shapes));
             assert!((a - b).abs() < 5e-3 * a, "{}, {alpha:?}: {a} and {b}", pipeline.name());
-            let count = differing(&fine, &shapes, 0.1);
-            assert!(count <= 150, "{}, {alpha:?}: {count} pixels differ", pipeline.name());
+            // Coverage is drawn anew for each triangle and for each side of a shape: only holes are where they were.
+            if matches!(alpha, AlphaMode::Mask { .. }) {
+                let count = differing(&fine, &shapes, 0.02);
+                assert!(count <= 20, "{}, {alpha:?}: {count} pixels differ", pipeline.name());
+            }
         }
     }
 }
@@ -375,10 +395,11 @@ fn a_stretched_sphere_is_an_ellipsoid() {
         Vec3::new(0.1, 0.2, 0.8),
     ));
     let mirrored = Affine3A::from_scale(Vec3::new(-1.0, 0.6, 1.2)) * Affine3A::from_rotation_z(0.5);
-    for (name, map) in [("squeezed", squeezed), ("sheared", sheared), ("mirrored", mirrored)] {
-        for pipeline in RAYS {
+    let (mut stage, mut last) = (Stage::default(), None);
+    for pipeline in RAYS {
+        for (name, map) in [("squeezed", squeezed), ("sheared", sheared), ("mirrored", mirrored)] {
             // The map inside the mesh, and as the instance's own; material: smooth, so that normals are seen in mirror images.
-            let image = |made: Made, inside: bool| {
+            let mut image = |made: Made, inside: bool| {
                 let mut scene = Scene::new();
                 let chrome =
                     scene.material(Material { metallic: 1.0, roughness: 0.0, ..Material::default() });
@@ -393,12 +414,15 @@ fn a_stretched_sphere_is_an_ellipsoid() {
                 scene.put(quad(8.0, 8.0), lambert(0.6), at(0.0, 0.0, -1.0));
                 scene.light(point_light(Vec3::new(1.5, 2.0, 4.0), 30.0));
                 let camera = camera_at(Vec3::new(0.3, 0.6, 4.0), Vec3::ZERO, 0.7);
-                Studio::of(EXTENT, still(pipeline), &scene.delta, camera).mean(1)
+                stage.mean(still(pipeline), &scene, camera, 1)
             };
             for inside in [false, true] {
                 let (fine, shapes) = (image(Made::Triangles, inside), image(Made::Shapes, inside));
+                if let Some(other) = last.replace(shapes.clone()).filter(|_| !inside) {
+                    assert!(differing(&other, &shapes, 0.02) > 100, "{name}: another map, another picture");
+                }
                 let count = differing(&fine, &shapes, 0.02);
-                assert!(count <= 60, "{name}, {}, inside {inside}: {count} pixels differ", pipeline.name());
+                assert!(count <= 6, "{name}, {}, inside {inside}: {count} pixels differ", pipeline.name());
             }
         }
     }
@@ -428,7 +452,7 @@ fn no_shape_shades_itself_at_any_scale() {
             scene.put(mesh, lambert(1.0), instance);
             let direction = Vec3::new(-0.9, -0.35, -0.25).normalize();
             scene.light(Light::Directional { direction, irradiance: Vec3::ONE, angular_radius_rad: 0.0 });
-            let mut camera = camera_parallel(1.1 * scale, 3.0 * scale);
+            let mut camera = camera_parallel(3.0 * scale, 1.1 * scale);
             camera.render_from_camera =
                 Affine3A::from_translation(Vec3::new(3.3, 1.7, -2.1) * scale) * camera.render_from_camera;
             camera.near_m = 0.01 * scale;

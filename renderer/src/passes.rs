@@ -35,7 +35,7 @@ use crate::accel::Accel;
 use crate::error::Result;
 use crate::gpu_types::Push;
 use crate::needs::Needs;
-use crate::shader::{ShaderLibrary, merge_interfaces};
+use crate::shader::{Compiled, ShaderLibrary, merge_interfaces};
 use crate::tables::Tables;
 
 /// Builds pipelines for one set of needs.
@@ -64,48 +64,32 @@ impl Builder<'_> {
     /// A ray-tracing pipeline around one ray generation shader; the other stages are the same for all.
     fn rays(&mut self, label: &str, file: &str) -> Result<RayTracingPipeline> {
         let generation = self.library.stage(file)?;
-        let surface_hit = self.library.stage("passes/rays/surface.rchit")?;
         let surface_miss = self.library.stage("passes/rays/surface.rmiss")?;
         let shadow_miss = self.library.stage("passes/rays/shadow.rmiss")?;
-        let any_hits = if self.needs.any_hit {
-            Some((
-                self.library.stage("passes/rays/surface.rahit")?,
-                self.library.stage("passes/rays/shadow.rahit")?,
-            ))
-        } else {
-            None
-        };
-        let shapes = if self.needs.shapes {
-            Some((
-                self.library.stage("passes/rays/shape.rint")?,
-                self.library.stage("passes/rays/shape.rchit")?,
-            ))
-        } else {
-            None
-        };
-        let mut stages = vec![&*generation, &*surface_hit, &*surface_miss, &*shadow_miss];
-        if let Some((surface, shadow)) = &any_hits {
-            stages.extend([&**surface, &**shadow]);
-        }
-        if let Some((intersection, hit)) = &shapes {
-            stages.extend([&**intersection, &**hit]);
+        let surface_hit = self.library.stage("passes/rays/surface.rchit")?;
+        let surface_any = self.optional(self.needs.any_hit, "passes/rays/surface.rahit")?;
+        let shadow_any = self.optional(self.needs.any_hit, "passes/rays/shadow.rahit")?;
+        let shape_hit = self.optional(self.needs.shapes, "passes/rays/shape.rchit")?;
+        let shape_intersection = self.optional(self.needs.shapes, "passes/rays/shape.rint")?;
+        let mut stages = vec![&*generation, &*surface_miss, &*shadow_miss, &*surface_hit];
+        for stage in [&surface_any, &shadow_any, &shape_hit, &shape_intersection] {
+            stages.extend(stage.as_deref());
         }
         let interface = merge_interfaces(&stages)?;
-        let (surface_any, shadow_any) = match &any_hits {
-            Some((surface, shadow)) => (Some(&surface.module), Some(&shadow.module)),
-            None => (None, None),
-        };
+        let [surface_any, shadow_any, shape_hit, shape_intersection] =
+            [&surface_any, &shadow_any, &shape_hit, &shape_intersection]
+                .map(|stage| stage.as_deref().map(|stage| &stage.module));
         // In the order of RAY_SURFACE and RAY_SHADOW; then the same for shapes (RAY_SHAPES).
-        let mut hit_groups = vec![
-            HitGroup { closest_hit: Some(&surface_hit.module), any_hit: surface_any, intersection: None },
-            HitGroup { closest_hit: None, any_hit: shadow_any, intersection: None },
-        ];
-        if let Some((intersection, hit)) = &shapes {
-            let intersection = Some(&intersection.module);
-            hit_groups.extend([
-                HitGroup { closest_hit: Some(&hit.module), any_hit: surface_any, intersection },
-                HitGroup { closest_hit: None, any_hit: shadow_any, intersection },
-            ]);
+        let of_kind = |closest_hit, intersection| {
+            [(closest_hit, surface_any), (None, shadow_any)].map(|(closest_hit, any_hit)| HitGroup {
+                closest_hit,
+                any_hit,
+                intersection,
+            })
+        };
+        let mut hit_groups = of_kind(Some(&surface_hit.module), None).to_vec();
+        if shape_intersection.is_some() {
+            hit_groups.extend(of_kind(shape_hit, shape_intersection));
         }
         let desc = RayTracingDesc {
             name: label,
@@ -114,6 +98,10 @@ impl Builder<'_> {
             hit_groups: &hit_groups,
         };
         Ok(RayTracingPipeline::new(self.device, &desc, &interface, &self.specialization, Some(self.set))?)
+    }
+
+    fn optional(&mut self, wanted: bool, file: &str) -> Result<Option<Arc<Compiled>>> {
+        wanted.then(|| self.library.stage(file)).transpose()
     }
 }
 

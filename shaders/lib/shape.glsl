@@ -9,8 +9,8 @@
 #include "lib/ray_offset.glsl"
 #include "lib/vector.glsl"
 
-// Rounding in unit space: of the place (octahedral, normalised), of the way there and of the roots (discriminant and 1 - |origin|): 4 each.
-const float BOUND_SHAPE = 16.0 * ROUNDING;
+// Rounding in unit space: 4 of the place (octahedral, normalised), 4 of the roots (discriminant and 1 - |origin|).
+const float BOUND_SHAPE = 8.0 * ROUNDING;
 // Rounding of the inverse of mesh_from_primitive as line_before takes it, as a multiple of the products of magnitudes.
 const float BOUND_INVERSE = 6.0 * ROUNDING;
 // Texture coordinates of a sphere change without bound at the poles: closer to the axis than this (squared) they stay as they are.

@@ -165,6 +165,7 @@ fn menu_name(menu: Menu) -> &'static str {
         Menu::Add => "Add",
         Menu::View => "View",
         Menu::Render => "Render",
+        Menu::Animation => "Animation",
         Menu::Tool => "Tool",
         Menu::Help => "Help",
     }
@@ -206,8 +207,9 @@ pub fn help(state: &mut UiState, session: &Session, context: &Context) {
     }
 }
 
-const MOUSE: [(&str, &str); 11] = [
+const MOUSE: [(&str, &str); 12] = [
     ("Click", "select; with Ctrl or Shift add or take away"),
+    ("Double click", "select one primitive of the mesh"),
     ("Drag a handle", "move, rotate or scale; Ctrl in steps, Esc cancels"),
     ("Middle drag, Alt + drag", "orbit"),
     ("Shift + middle drag", "pan"),

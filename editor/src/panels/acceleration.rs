@@ -18,14 +18,13 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         return;
     }
     ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
+        ui.spacing_mut().interact_size.y = 16.0;
         ui.horizontal_top(|ui| {
             ui.vertical(|ui| counters(cx, ui));
             ui.add_space(24.0);
-            ui.vertical(|ui| {
-                state(ui, &statistics.acceleration);
-                ui.add_space(8.0);
-                reasons(cx, ui);
-            });
+            ui.vertical(|ui| state(ui, &statistics.acceleration));
+            ui.add_space(24.0);
+            ui.vertical(|ui| reasons(cx, ui));
         });
     });
 }
@@ -83,7 +82,7 @@ fn counters(cx: &Cx<'_>, ui: &mut Ui) {
             [statistics.uploaded_bytes, tally.last_work_bytes, tally.uploaded_bytes].map(bytes),
         ),
     ];
-    egui::Grid::new("acceleration").num_columns(4).spacing([20.0, 4.0]).striped(true).show(ui, |ui| {
+    egui::Grid::new("acceleration").num_columns(4).spacing([20.0, 2.0]).striped(true).show(ui, |ui| {
         ui.label("");
         head(ui, "this frame", "Of the picture that is shown");
         head(ui, "last change", "Of the last frame that built, refitted or swapped anything");
@@ -112,7 +111,7 @@ fn state(ui: &mut Ui, now: &AccelStatistics) {
         ("Not built yet", now.blas_pending.to_string()),
         ("In the background", now.blas_background.to_string()),
     ];
-    egui::Grid::new("acceleration now").num_columns(2).spacing([16.0, 4.0]).show(ui, |ui| {
+    egui::Grid::new("acceleration now").num_columns(2).spacing([16.0, 2.0]).show(ui, |ui| {
         for (name, figure) in lines {
             ui.weak(name);
             ui.monospace(format!("{figure:>11}"));

@@ -79,7 +79,7 @@ fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     let Some(local) = cx.session.document().local(target) else { return };
     let inspector = &mut cx.state.inspector;
     let (euler, uniform) = (&mut inspector.euler, inspector.uniform_scale);
-    let changed = trs_fields(ui, euler, target, local.nearest_trs(), uniform);
+    let changed = trs_fields(ui, "parent", euler, target, local.nearest_trs(), uniform);
     ui.checkbox(&mut cx.state.inspector.uniform_scale, "Scale all axes together");
     if matches!(local, Local::Matrix(_)) {
         ui.colored_label(
@@ -98,9 +98,10 @@ fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     }
 }
 
-/// Position, rotation and scale; gives them when one was changed.
+/// Position, rotation and scale against `parent`; gives them when one was changed.
 pub(super) fn trs_fields(
     ui: &mut Ui,
+    parent: &str,
     euler: &mut EulerFields,
     target: Target,
     trs: Trs,
@@ -108,17 +109,17 @@ pub(super) fn trs_fields(
 ) -> Option<Trs> {
     let mut changed = None;
     let speed = (trs.translation.abs().max_element() * 0.002).clamp(0.002, 1.0);
-    let moved =
-        vector_field(ui, "Position", "Metres against the parent", trs.translation, speed, " m", DVec3::ZERO);
+    let tip = format!("Metres against the {parent}");
+    let moved = vector_field(ui, "Position", &tip, trs.translation, speed, " m", DVec3::ZERO);
     if let Some(translation) = moved {
         changed = Some(Trs { translation, ..trs });
     }
     let shown = euler.degrees(target, trs.rotation);
-    let tip = "Degrees about X, then Y, then Z (fixed axes of the parent)";
-    if let Some(degrees) = vector_field(ui, "Rotation", tip, shown, 0.5, "\u{b0}", DVec3::ZERO) {
+    let tip = format!("Degrees about X, then Y, then Z (fixed axes of the {parent})");
+    if let Some(degrees) = vector_field(ui, "Rotation", &tip, shown, 0.5, "\u{b0}", DVec3::ZERO) {
         changed = Some(Trs { rotation: euler.set(target, degrees), ..trs });
     }
-    let tip = "Along the object's own axes; negative mirrors";
+    let tip = "Along its own axes; negative mirrors";
     if let Some(scale) = vector_field(ui, "Scale", tip, trs.scale, 0.01, "", DVec3::ONE) {
         changed = Some(Trs { scale: if uniform_scale { uniform(trs.scale, scale) } else { scale }, ..trs });
     }

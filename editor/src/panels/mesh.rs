@@ -122,7 +122,7 @@ fn primitives(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
             let button = Button::new(text)
                 .right_text(RichText::new(format!("{triangles}")).weak().small())
                 .selected(chosen == Some(index))
-                .frame_when_inactive(false)
+                .frame_when_inactive(chosen == Some(index))
                 .truncate()
                 .min_size(egui::vec2(ui.available_width(), ROW));
             let tip = "Triangles of one material. Click to move it inside its mesh; a double click in the view does the same";
@@ -157,7 +157,7 @@ fn place(cx: &mut Cx<'_>, ui: &mut Ui, selected: SelectedPrimitive) {
     let inspector = &mut cx.state.inspector;
     let (euler, uniform) = (&mut inspector.primitive_euler, inspector.uniform_scale);
     let trs = Local::from_affine(mesh_from_primitive).nearest_trs();
-    let changed = ui.push_id("primitive", |ui| trs_fields(ui, euler, target, trs, uniform)).inner;
+    let changed = ui.push_id("primitive", |ui| trs_fields(ui, "mesh", euler, target, trs, uniform)).inner;
     let mut new = changed.map(|trs| Local::Trs(trs).to_affine());
     let moved = mesh_from_primitive != DAffine3::IDENTITY;
     let button = Button::new(format!("{}  Back to its place in the file", icon::ARROW_COUNTER_CLOCKWISE));

@@ -104,13 +104,17 @@ fn button(cx: &mut Cx<'_>, ui: &mut Ui, command: &Command) {
     }
 }
 
-/// " 1.042 / 3.333 s   frame  25 / 80".
+/// "  1.042 / 3.333 s   frame 25 / 80".
 fn figures(time_s: Option<f64>, duration_s: f64) -> String {
     let frame = |time_s: f64| (time_s * FRAMES_PER_SECOND + 1e-6).floor();
-    let last = frame(duration_s);
+    // As wide as the last ones, so that they do not jump.
+    let (end, last) = (format!("{duration_s:.3}"), frame(duration_s).to_string());
+    let (wide, broad) = (end.len().max("at rest".len()), last.len());
     match time_s {
-        Some(time_s) => format!("{time_s:7.3} / {duration_s:.3} s   frame {:4} / {last}", frame(time_s)),
-        None => format!("at rest / {duration_s:.3} s   frame    \u{2014} / {last}"),
+        Some(time_s) => {
+            format!("{time_s:wide$.3} / {end} s   frame {:broad$} / {last}", frame(time_s))
+        }
+        None => format!("{:>wide$} / {end} s   frame {:>broad$} / {last}", "at rest", "\u{2014}"),
     }
 }
 
@@ -284,10 +288,10 @@ mod tests {
 
     #[test]
     fn time_is_told_in_seconds_and_frames() {
-        assert_eq!(figures(Some(1.0), 2.5), "  1.000 / 2.500 s   frame   24 / 60");
+        assert_eq!(figures(Some(1.0), 2.5), "  1.000 / 2.500 s   frame 24 / 60");
         // A time on a frame is that frame, whatever its last digits.
-        assert_eq!(figures(Some(0.1 + 0.2 - 0.05), 2.5), "  0.250 / 2.500 s   frame    6 / 60");
-        assert!(figures(None, 2.5).starts_with("at rest"));
+        assert_eq!(figures(Some(0.1 + 0.2 - 0.05), 2.5), "  0.250 / 2.500 s   frame  6 / 60");
+        assert_eq!(figures(None, 2.5), "at rest / 2.500 s   frame  \u{2014} / 60");
     }
 
     #[test]

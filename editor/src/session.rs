@@ -3,6 +3,7 @@
 
 mod camera;
 mod files;
+mod host_times;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,7 @@ use glam::DVec3;
 
 pub use camera::ViewCamera;
 pub use files::{Loaded, environment_argument, load};
+pub use host_times::{HostTimes, Lap};
 
 use crate::history::History;
 use crate::sync::{Sync, camera_of};
@@ -65,6 +67,7 @@ pub struct Session {
     /// The renderer may hold half of a change: it gets the whole scene again.
     resync: bool,
     picture_revision: u64,
+    host_times: HostTimes,
     device: Arc<Device>,
 }
 
@@ -95,6 +98,7 @@ impl Session {
             selection_changed: false,
             resync: false,
             picture_revision: 0,
+            host_times: HostTimes::default(),
             device: Arc::clone(device),
         })
     }
@@ -321,8 +325,10 @@ impl Session {
     /// # Errors
     /// When a shader does not compile or fit, memory runs out, or the device is lost.
     pub fn begin_frame(&mut self, extent_px: [u32; 2]) -> anyhow::Result<Recorder> {
+        let mut lap = Lap::start();
         let mut recorder = self.frames.begin()?;
         self.renderer.note_times(self.view, &self.frames)?;
+        self.host_times.begin_ms = lap.ms();
         match self.record(&mut recorder, extent_px) {
             Ok(()) => Ok(recorder),
             Err(error) => {
@@ -339,13 +345,16 @@ impl Session {
             self.document.mark_all_added("tried again");
             self.renderer.apply(recorder, &std::mem::take(&mut self.sync).clear())?;
         }
+        let mut lap = Lap::start();
         let delta = self.sync.delta(&mut self.document, self.camera.world_from_camera.translation);
+        self.host_times.sync_ms = lap.ms();
         let selection_stale = self.selection_changed || !delta.instances.is_empty();
         if let Err(error) = self.renderer.apply(recorder, &delta) {
             // Half of the change is in: the next frame sends the whole scene again.
             self.resync = true;
             return Err(error.into());
         }
+        self.host_times.apply_ms = lap.ms();
         if selection_stale {
             self.renderer.select(self.view, outlined(&self.document, &self.selection).into_iter())?;
             self.selection_changed = false;
@@ -360,7 +369,13 @@ impl Session {
         view.resize(extent_px);
         view.set_camera(camera);
         self.renderer.render(recorder, self.view)?;
+        self.host_times.render_ms = lap.ms();
         Ok(())
+    }
+
+    /// Where the host's time of the last frame went.
+    pub fn host_times(&self) -> HostTimes {
+        self.host_times
     }
 
     /// Starts a frame that leaves the view's image as it was: the window repaints its panels alone.

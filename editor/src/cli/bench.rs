@@ -5,6 +5,7 @@ mod crowd;
 mod edits;
 mod machine;
 mod moves;
+mod rig;
 mod series;
 mod shapes;
 mod skinned;

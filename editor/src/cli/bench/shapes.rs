@@ -4,16 +4,16 @@ use std::f32::consts::TAU;
 use std::sync::Arc;
 
 use caustica_scene::import::Imported;
-use caustica_scene::{Material, MaterialId, Mesh, MeshData, Prefab, Primitive};
+use caustica_scene::{Material, MaterialId, Mesh, MeshData, Prefab, Primitive, SkinData};
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 
 /// Vertices of a surface of revolution around y, one run of `segments + 1` a point of the profile.
 pub(super) struct Lathe {
     pub(super) positions: Vec<Vec3>,
-    pub(super) normals: Vec<Vec3>,
-    pub(super) tangents: Vec<Vec4>,
-    pub(super) tex_coords: Vec<Vec2>,
-    pub(super) indices: Vec<u32>,
+    normals: Vec<Vec3>,
+    tangents: Vec<Vec4>,
+    tex_coords: Vec<Vec2>,
+    indices: Vec<u32>,
 }
 
 /// Turns a profile of (radius, height), from the bottom up, around y. Triangles without area at the poles are left out.
@@ -85,7 +85,7 @@ pub(super) fn props() -> Imported {
     };
     Imported {
         prefab: Prefab::new("props", ""),
-        meshes: made.into_iter().map(mesh_of).collect(),
+        meshes: made.into_iter().map(|made| mesh_of(made, None)).collect(),
         materials: colours.map(material).into(),
         ..Imported::default()
     }
@@ -94,7 +94,8 @@ pub(super) fn props() -> Imported {
 /// Index among the props of the mesh that only one node of a scene uses.
 pub(super) const LONE_MESH: usize = 4;
 
-fn mesh_of(made: Lathe) -> Mesh {
+/// A mesh of one primitive; a skin may bend it.
+pub(super) fn mesh_of(made: Lathe, skin: Option<SkinData>) -> Mesh {
     let primitive = Primitive {
         first_index: 0,
         index_count: made.indices.len() as u32,
@@ -107,6 +108,7 @@ fn mesh_of(made: Lathe) -> Mesh {
         tangents: made.tangents,
         tex_coords0: made.tex_coords,
         indices: made.indices,
+        skin,
         ..MeshData::default()
     };
     Mesh::new(String::from("prop"), Arc::new(data), vec![primitive])

@@ -4,6 +4,7 @@
 mod camera;
 mod files;
 mod frame;
+mod host_times;
 mod tally;
 
 use std::collections::BTreeSet;
@@ -19,6 +20,7 @@ use glam::DVec3;
 
 pub use camera::ViewCamera;
 pub use files::{Loaded, environment_argument, load};
+pub use host_times::{HostTimes, Lap};
 pub use tally::Tally;
 
 use crate::history::History;
@@ -69,6 +71,7 @@ pub struct Session {
     picture_revision: u64,
     profile: ProfileInForce,
     tally: Tally,
+    host_times: HostTimes,
     device: Arc<Device>,
 }
 
@@ -103,6 +106,7 @@ impl Session {
             picture_revision: 0,
             profile,
             tally: Tally::default(),
+            host_times: HostTimes::default(),
             device: Arc::clone(device),
         })
     }

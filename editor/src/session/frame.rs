@@ -7,7 +7,7 @@ use caustica_renderer::Statistics;
 use caustica_renderer::gpu::{Acquired, Image, Recorder};
 use caustica_scene::{Document, NodeId, Target};
 
-use super::{Pick, Session, Tally};
+use super::{HostTimes, Lap, Pick, Session, Tally};
 use crate::sync::{camera_of, instance_id};
 
 /// A still view stops asking for frames at this many samples.
@@ -19,8 +19,10 @@ impl Session {
     /// # Errors
     /// When a shader does not compile or fit, memory runs out, or the device is lost.
     pub fn begin_frame(&mut self, extent_px: [u32; 2]) -> anyhow::Result<Recorder> {
+        let mut lap = Lap::start();
         let mut recorder = self.frames.begin()?;
         self.renderer.note_times(self.view, &self.frames)?;
+        self.host_times.begin_ms = lap.ms();
         match self.record(&mut recorder, extent_px) {
             Ok(()) => Ok(recorder),
             Err(error) => {
@@ -37,13 +39,16 @@ impl Session {
             self.document.mark_all_added("tried again");
             self.renderer.apply(recorder, &std::mem::take(&mut self.sync).clear())?;
         }
+        let mut lap = Lap::start();
         let delta = self.sync.delta(&mut self.document, self.camera.world_from_camera.translation);
+        self.host_times.sync_ms = lap.ms();
         let selection_stale = self.selection_changed || !delta.instances.is_empty();
         if let Err(error) = self.renderer.apply(recorder, &delta) {
             // Half of the change is in: the next frame sends the whole scene again.
             self.resync = true;
             return Err(error.into());
         }
+        self.host_times.apply_ms = lap.ms();
         if selection_stale {
             self.renderer.select(self.view, outlined(&self.document, &self.selection).into_iter())?;
             self.selection_changed = false;
@@ -59,7 +64,13 @@ impl Session {
         view.set_camera(camera);
         self.renderer.render(recorder, self.view)?;
         self.tally.note(self.renderer.statistics(self.view)?);
+        self.host_times.render_ms = lap.ms();
         Ok(())
+    }
+
+    /// Where the host's time of the last frame went.
+    pub fn host_times(&self) -> HostTimes {
+        self.host_times
     }
 
     /// Starts a frame that leaves the view's image as it was: the window repaints its panels alone.

@@ -36,6 +36,10 @@ impl Tables {
         self.apply_materials(recorder, delta, &mut others)?;
         let mut redrawn = self.apply_instances(delta, changed)?;
         self.follow_others(&others, changed, &mut redrawn)?;
+        // Last: a pose is for the mesh as it is now.
+        for (id, pose) in &delta.poses {
+            self.deforming.set_pose(*id, pose)?;
+        }
         for id in &delta.removed_meshes {
             self.meshes.remove(*id);
         }
@@ -136,9 +140,6 @@ impl Tables {
                 redrawn.insert(slot);
             }
         }
-        for (id, pose) in &delta.poses {
-            self.deforming.set_pose(*id, pose)?;
-        }
         Ok(redrawn)
     }
 
@@ -151,7 +152,11 @@ impl Tables {
         if others.meshes.is_empty() && others.materials.is_empty() {
             return Ok(());
         }
-        self.deforming.follow_meshes(&others.meshes, &self.meshes)?;
+        for (_, entry) in
+            self.instances.iter().filter(|(_, entry)| others.meshes.contains(&entry.instance.mesh))
+        {
+            self.deforming.follow_mesh(entry.id, &entry.instance, &self.meshes)?;
+        }
         let named = |entry: &Slot| {
             others.meshes.contains(&entry.instance.mesh)
                 || entry.instance.materials.iter().any(|id| others.materials.contains(id))

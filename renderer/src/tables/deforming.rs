@@ -94,9 +94,7 @@ impl Deforming {
             return Ok(());
         }
         let new = DeformingMesh::new(&self.device, instance.mesh, mesh, deformation, instance.pose.clone())?;
-        self.moved_last_frame.remove(&id);
-        self.by_id.insert(id, new);
-        self.dirty.insert(id);
+        self.insert(id, new);
         Ok(())
     }
 
@@ -122,28 +120,25 @@ impl Deforming {
         }
     }
 
-    /// Makes the vertices of instances anew whose mesh has new content. A pose that does not fit it is dropped: they then
-    /// rest until the next one.
+    /// The mesh of an instance has new content: its vertices are made anew, or it begins or ceases to deform. A pose that
+    /// does not fit the new content is dropped: the instance then rests until the next one.
     ///
     /// # Errors
-    /// When a mesh is unknown, or memory runs out.
-    pub(crate) fn follow_meshes(&mut self, changed: &BTreeSet<MeshId>, meshes: &Meshes) -> Result<()> {
-        let concerned = self.by_id.iter().filter(|(_, known)| changed.contains(&known.mesh));
-        let concerned: Vec<_> = concerned.map(|(id, known)| (*id, known.mesh)).collect();
-        for (id, mesh_id) in concerned {
-            let mesh = meshes.get(mesh_id)?;
-            let Some(deformation) = &mesh.deformation else {
-                self.remove(id);
-                continue;
-            };
-            let Some(known) = self.by_id.get_mut(&id).filter(|known| known.content != mesh.content()) else {
-                continue;
-            };
-            let pose = known.pose.take().filter(|pose| deformation.check_pose(pose).is_ok());
-            *known = DeformingMesh::new(&self.device, mesh_id, mesh, deformation, pose)?;
-            self.moved_last_frame.remove(&id);
-            self.dirty.insert(id);
+    /// When the mesh is unknown, or memory runs out.
+    pub(crate) fn follow_mesh(&mut self, id: InstanceId, instance: &Instance, meshes: &Meshes) -> Result<()> {
+        let mesh = meshes.get(instance.mesh)?;
+        let Some(deformation) = &mesh.deformation else {
+            self.remove(id);
+            return Ok(());
+        };
+        let known = self.by_id.get(&id);
+        if known.is_some_and(|known| known.content == mesh.content()) {
+            return Ok(());
         }
+        let pose = known.map_or(&instance.pose, |known| &known.pose).clone();
+        let pose = pose.filter(|pose| deformation.check_pose(pose).is_ok());
+        let new = DeformingMesh::new(&self.device, instance.mesh, mesh, deformation, pose)?;
+        self.insert(id, new);
         Ok(())
     }
 
@@ -204,6 +199,12 @@ impl Deforming {
             }
         }
         Ok(changed)
+    }
+
+    fn insert(&mut self, id: InstanceId, new: DeformingMesh) {
+        self.moved_last_frame.remove(&id);
+        self.by_id.insert(id, new);
+        self.dirty.insert(id);
     }
 
     fn take_pose(&mut self, id: InstanceId, pose: Option<&Pose>) {

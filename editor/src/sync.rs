@@ -84,7 +84,8 @@ impl Sync {
         delta
     }
 
-    /// Only the targets themselves count, never what hangs below them.
+    /// Only the targets themselves count, never what hangs below them. A primitive that moves inside its mesh counts when
+    /// the instance is next moved or sent: to follow it at once would cost every instance of the mesh.
     fn note_extents(&mut self, document: &Document, changes: &ChangeSet) {
         for target in changes.removed.keys() {
             self.extents.remove(*target);

@@ -76,5 +76,12 @@ pub enum RendererError {
     },
 }
 
+impl RendererError {
+    /// Whether memory ran out: less of it may do.
+    pub(crate) fn is_out_of_memory(&self) -> bool {
+        matches!(self, Self::Gpu(GpuError::OutOfMemory { .. }))
+    }
+}
+
 /// Result of this package.
 pub type Result<T> = std::result::Result<T, RendererError>;

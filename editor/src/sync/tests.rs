@@ -1,6 +1,7 @@
 //! Deltas hold what changed and no more.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+mod mirror;
 mod rig;
 
 use super::*;
@@ -121,13 +122,13 @@ fn what_is_hidden_is_sent_as_visibility_and_a_hidden_light_goes() {
     assert_eq!(filled(&delta), [("visibility", 4), ("lights", 1)]);
 
     let target = rig.part(BOX);
-    let (delta, undo) =
-        rig.apply(Edit::SetRayVisibility { target, camera_visible: false, casts_shadows: true });
-    assert_eq!(filled(&delta), [("visibility", 1)]);
-    let unseen = delta::Visibility { shown: true, to_camera: false, to_shadows: true };
-    assert_eq!(delta.visibility, [(rig.id(BOX), unseen)]);
-    let (delta, _) = rig.apply(undo);
-    assert_eq!(delta.visibility, [(rig.id(BOX), delta::Visibility::default())]);
+    for (to_camera, to_shadows) in [(false, true), (true, false), (true, true)] {
+        let edit = Edit::SetRayVisibility { target, camera_visible: to_camera, casts_shadows: to_shadows };
+        let (delta, _) = rig.apply(edit);
+        assert_eq!(filled(&delta), [("visibility", 1)]);
+        let seen = delta::Visibility { shown: true, to_camera, to_shadows };
+        assert_eq!(delta.visibility, [(rig.id(BOX), seen)]);
+    }
 }
 
 #[test]

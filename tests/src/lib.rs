@@ -10,6 +10,7 @@ pub mod numbers;
 pub mod picture;
 pub mod program;
 pub mod scene;
+pub mod shapes;
 pub mod studio;
 
 use std::path::PathBuf;

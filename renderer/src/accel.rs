@@ -201,7 +201,7 @@ impl Accel {
             let deforms = blas.key.deforming.is_some();
             let edited = changed.reshaped.contains(&blas.key.mesh);
             let form = if deforms || edited { Form::Dynamic } else { Form::Static { compacted: false } };
-            let own = tables.meshes.get(blas.key.mesh)?.triangle_count();
+            let own = tables.meshes.get(blas.key.mesh)?.element_count();
             if !deforms && !self.policy.fits_frame(triangles, own) {
                 self.blases.wait_for_background(number);
                 continue;

@@ -58,6 +58,7 @@ pub fn mesh_of(mesh: &scene::Mesh) -> delta::Mesh {
         tex_coords1: data.tex_coords1.clone(),
         colors: data.colors.clone(),
         indices: data.indices.clone(),
+        shapes: Vec::new(),
         geometries: mesh
             .primitives
             .iter()

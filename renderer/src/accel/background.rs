@@ -202,7 +202,7 @@ impl Later {
                 None,
                 Some(&snapshot),
             )?;
-            triangles += job.triangles();
+            triangles += job.element_count();
             items.push(Item {
                 number: *number,
                 version: blas.version,

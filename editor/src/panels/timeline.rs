@@ -26,10 +26,12 @@ const ROW: f32 = 26.0;
 pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
     let instances = animated(cx);
     let duration_s = cx.session.duration();
+    // A time at which no clip acts is no place on the scale.
+    let time_s = cx.session.time().filter(|_| duration_s.is_some());
     ui.add_enabled_ui(duration_s.is_some(), |ui| {
-        transport(cx, ui, duration_s.unwrap_or(0.0));
+        transport(cx, ui, time_s, duration_s.unwrap_or(0.0));
         ui.add_space(4.0);
-        if let Some(time_s) = ruler(ui, cx.session.time(), duration_s.unwrap_or(0.0)) {
+        if let Some(time_s) = ruler(ui, time_s, duration_s.unwrap_or(0.0)) {
             cx.state.playback.playing = false;
             cx.session.set_time(Some(time_s));
         }
@@ -62,14 +64,14 @@ fn animated(cx: &mut Cx<'_>) -> Vec<NodeId> {
 }
 
 /// Buttons, figures, speed.
-fn transport(cx: &mut Cx<'_>, ui: &mut Ui, duration_s: f64) {
+fn transport(cx: &mut Cx<'_>, ui: &mut Ui, time_s: Option<f64>, duration_s: f64) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         for command in commands().iter().filter(|command| command.menu == Menu::Animation) {
-            button(cx, ui, command);
+            button(cx, ui, command, time_s);
         }
         ui.add_space(8.0);
-        ui.label(RichText::new(figures(cx.session.time(), duration_s)).monospace())
+        ui.label(RichText::new(figures(time_s, duration_s)).monospace())
             .on_hover_text(format!("Time and frame, of all; {FRAMES_PER_SECOND} frames a second"));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let old = cx.state.playback.speed;
@@ -87,13 +89,13 @@ fn transport(cx: &mut Cx<'_>, ui: &mut Ui, duration_s: f64) {
     });
 }
 
-fn button(cx: &mut Cx<'_>, ui: &mut Ui, command: &Command) {
+fn button(cx: &mut Cx<'_>, ui: &mut Ui, command: &Command, time_s: Option<f64>) {
     let playback = &cx.state.playback;
     let (mark, name, on) = match command.action {
         Action::PlayPause if playback.playing => (icon::PAUSE, "Pause", true),
         Action::PlayPause => (command.icon, "Play", false),
         Action::ToggleLoop => (command.icon, "Begin again at the end", playback.looping),
-        Action::RestPose => (command.icon, "Rest pose: no clip acts", cx.session.time().is_none()),
+        Action::RestPose => (command.icon, "Rest pose: no clip acts", time_s.is_none()),
         _ => (command.icon, command.name.as_str(), false),
     };
     let key = command.shortcut.map(|shortcut| format!(" ({})", ui.ctx().format_shortcut(&shortcut)));

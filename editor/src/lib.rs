@@ -11,7 +11,7 @@ mod history;
 mod log_buffer;
 mod panels;
 mod projection;
-mod session;
+pub mod session;
 mod sync;
 mod theme;
 mod ui_renderer;

@@ -215,6 +215,10 @@ fn a_pose_uploads_its_joints_and_refits_one_tree() {
         // The joints, a job, an instance number or two, and in the first of these frames a geometry record.
         assert!(bytes < 512, "step {step}: {bytes} bytes, of a mesh of {}", mesh.positions.len() * 64);
     }
+    studio.frames(1);
+    studio.frame(&pose_delta(ids[0], bent(0.5, 1.0)));
+    let figures = studio.statistics();
+    assert_eq!((figures.acceleration.blas_refit, figures.uploaded_bytes), (0, idle), "the pose that it has");
 }
 
 /// Motion in pixels at a pixel, from the picture of the motion vectors.

@@ -20,6 +20,15 @@ pub fn render_from(world: &DAffine3, origin: DVec3) -> Affine3A {
     Affine3A::from_mat3_translation(m.as_mat3(), (world.translation - origin).as_vec3())
 }
 
+/// Who sees a placed mesh.
+pub fn visibility_of(renderable: &scene::Renderable) -> delta::Visibility {
+    delta::Visibility {
+        shown: renderable.visible,
+        to_camera: renderable.camera_visible,
+        to_shadows: renderable.casts_shadows,
+    }
+}
+
 /// A camera of the document, or of the editor, as the renderer wants it.
 pub fn camera_of(
     world_from_camera: &DAffine3,
@@ -58,7 +67,7 @@ pub fn mesh_of(mesh: &scene::Mesh) -> delta::Mesh {
                 mesh_from_primitive: render_from(&primitive.mesh_from_primitive, DVec3::ZERO),
             })
             .collect(),
-        deformation: None,
+        deformation: super::deform::deformation_of(mesh),
     }
 }
 

@@ -53,7 +53,7 @@ impl Emissive {
         let Some(entry) = instances.get(slot) else { return };
         let now = metric(&entry.instance.render_from_mesh);
         let size = old.x_axis.x.abs().max(old.y_axis.y.abs()).max(old.z_axis.z.abs());
-        let differs = (now - *old).to_cols_array().iter().any(|d| !(d.abs() <= AREA_TOLERANCE * size));
+        let differs = (now - *old).to_cols_array().iter().any(|d| d.is_nan() || d.abs() > AREA_TOLERANCE * size);
         if differs {
             *old = now;
             self.stale = true;

@@ -1,0 +1,73 @@
+//! Meshes: vertices, primitives, and how they deform.
+
+use glam::{Affine3A, Vec2, Vec3, Vec4};
+
+/// Triangles with their attributes. All arrays but `tex_coords1` and `colors` hold one entry a vertex;
+/// those two may be empty. Every index of every geometry is below `positions.len()`.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Shown in messages.
+    pub name: String,
+    /// Positions, mesh space, finite.
+    pub positions: Vec<Vec3>,
+    /// Unit normals, mesh space.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents, mesh space; w is the handedness, 1 or -1 (glTF 2.0, section 3.7.2.1).
+    pub tangents: Vec<Vec4>,
+    /// First set of texture coordinates.
+    pub tex_coords0: Vec<Vec2>,
+    /// Second set of texture coordinates, or empty.
+    pub tex_coords1: Vec<Vec2>,
+    /// Linear vertex colours with alpha, or empty.
+    pub colors: Vec<Vec4>,
+    /// Three indices a triangle, for all geometries one after the other.
+    pub indices: Vec<u32>,
+    /// The primitives of the mesh; each becomes one geometry of the BLAS.
+    pub geometries: Vec<Geometry>,
+    /// How its vertices follow a pose; `None`: rigid. Each instance of a mesh that deforms has vertices and a BLAS of its own.
+    pub deformation: Option<Deformation>,
+}
+
+/// How vertices follow a [`Pose`]: first the morph targets are added, then the joints move the sum (glTF 2.0, 3.7.2.2 and 3.7.3.3).
+#[derive(Clone, Debug, Default)]
+pub struct Deformation {
+    /// Four joints a vertex, or empty: no skin. Every joint is below `joint_count`.
+    pub joints: Vec<[u16; 4]>,
+    /// Their weights, in sum 1; all zero: the vertex follows no joint. As many as `joints`.
+    pub weights: Vec<[f32; 4]>,
+    /// Number of joint matrices in a pose.
+    pub joint_count: u32,
+    /// Morph targets.
+    pub targets: Vec<MorphTarget>,
+}
+
+/// Offsets a vertex, each list with one entry a vertex or empty.
+#[derive(Clone, Debug, Default)]
+pub struct MorphTarget {
+    /// Offsets of the positions.
+    pub positions: Vec<Vec3>,
+    /// Offsets of the normals.
+    pub normals: Vec<Vec3>,
+    /// Offsets of the tangents; the handedness stays.
+    pub tangents: Vec<Vec3>,
+}
+
+/// Where the joints of one instance stand, and how far it is morphed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// One a joint: mesh space at rest to mesh space as posed (inverse bind matrix included).
+    pub joints: Vec<Affine3A>,
+    /// One a morph target.
+    pub weights: Vec<f32>,
+}
+
+/// One primitive of a mesh: a range of its indices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Geometry {
+    /// First index, a multiple of 3.
+    pub first_index: u32,
+    /// Number of indices, a multiple of 3.
+    pub index_count: u32,
+    /// Places the primitive inside its mesh; identity on import.
+    pub mesh_from_primitive: Affine3A,
+}

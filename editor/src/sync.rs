@@ -84,15 +84,23 @@ impl Sync {
         delta
     }
 
-    /// Only the targets themselves count, never what hangs below them.
+    /// Only the targets themselves count, never what hangs below them. A mesh that changes does so wherever it is placed.
     fn note_extents(&mut self, document: &Document, changes: &ChangeSet) {
         for target in changes.removed.keys() {
             self.extents.remove(*target);
         }
-        for target in changes.added.keys().chain(changes.transforms.keys()).chain(&changes.poses) {
-            match document.own_bounds(*target) {
-                Some((low, high)) => self.extents.set(*target, (high - low).length()),
-                None => self.extents.remove(*target),
+        let mut resized: BTreeSet<Target> =
+            changes.added.keys().chain(changes.transforms.keys()).copied().collect();
+        resized.extend(&changes.poses);
+        let moved = changes.primitive_transforms.iter().map(|(mesh, _)| mesh);
+        for mesh in changes.meshes.iter().chain(moved) {
+            resized
+                .extend(self.assets.users_of(*mesh).filter(|target| !changes.removed.contains_key(target)));
+        }
+        for target in resized {
+            match document.own_bounds(target) {
+                Some((low, high)) => self.extents.set(target, (high - low).length()),
+                None => self.extents.remove(target),
             }
         }
     }

@@ -102,6 +102,11 @@ impl Assets {
         users
     }
 
+    /// Who places a mesh.
+    pub(super) fn users_of(&self, mesh: MeshId) -> impl Iterator<Item = Target> {
+        self.meshes.get(&mesh).into_iter().flat_map(|known| &known.users).copied()
+    }
+
     /// How poses of a mesh look.
     pub(super) fn shape_of(&self, mesh: MeshId) -> Shape {
         self.meshes.get(&mesh).map(|known| known.shape).unwrap_or_default()
@@ -117,7 +122,9 @@ impl Assets {
         for id in materials {
             let Some(material) = document.material(id) else { continue };
             let Some((_, old)) = self.materials.get_mut(&id) else { continue };
-            let used: Vec<TextureId> = material.textures().map(|used| used.texture).collect();
+            // A texture that its prefab has taken along is shown as none.
+            let textures_used = material.textures().map(|used| used.texture);
+            let used: Vec<TextureId> = textures_used.filter(|id| document.texture(*id).is_some()).collect();
             let old = std::mem::replace(old, used.clone());
             for texture in &used {
                 let count = self.textures.entry(*texture).or_insert(0);

@@ -5,6 +5,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::say_line(format_args!($($text)*)) };
 }
 
+mod bench;
 mod check;
 mod devices;
 mod output;
@@ -42,6 +43,8 @@ enum Command {
     Check(check::CheckArgs),
     /// List the Vulkan devices, what each lacks, and which one is chosen; or measure one
     Devices(devices::DevicesArgs),
+    /// Measure what scenes, edits and acceleration structures cost here
+    Bench(bench::BenchArgs),
 }
 
 /// Which device, and how.
@@ -92,6 +95,7 @@ pub fn run() -> ExitCode {
         Some(Command::Render(args)) => logged(|| render::run(&args, &cli.device, cli.shaders.clone())),
         Some(Command::Check(args)) => logged(|| check::run(&args)),
         Some(Command::Devices(args)) => logged(|| devices::run(&args, &cli.device)),
+        Some(Command::Bench(args)) => logged(|| bench::run(&args, &cli.device, cli.shaders.clone())),
         None => match cli.file.as_ref().filter(|file| !file.exists()) {
             Some(missing) => {
                 let missing = missing.display();

@@ -329,6 +329,8 @@ pub struct Start {
     pub local: Local,
     /// Its parent's space to world space.
     pub world_from_parent: DAffine3,
+    /// The point of its own space that stays where it is when it is scaled.
+    pub middle: DVec3,
 }
 
 impl Start {
@@ -355,7 +357,11 @@ impl Start {
                     DQuat::from_axis_angle(axis, angle_rad * sign),
                 )
             }
-            Motion::Scale(factors) => with_scale(self.local, factors),
+            Motion::Scale(factors) => {
+                let scaled = with_scale(self.local, factors);
+                let stays = |local: Local| local.to_affine().transform_point3(self.middle);
+                with_translation(scaled, scaled.translation() + stays(self.local) - stays(scaled))
+            }
         };
         moved.is_finite().then_some(moved)
     }

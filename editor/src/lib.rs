@@ -10,6 +10,7 @@ mod gizmo;
 mod history;
 mod log_buffer;
 mod panels;
+mod playback;
 mod projection;
 pub mod session;
 mod sync;

@@ -9,14 +9,17 @@ use crate::app::actions::Action;
 use crate::session::Session;
 use crate::ui_state::UiState;
 
+pub mod acceleration;
 pub mod bars;
 pub mod environment;
 pub mod inspector;
 pub mod material;
+pub mod mesh;
 pub mod outliner;
 pub mod overlays;
 pub mod render;
 pub mod reports;
+pub mod timeline;
 pub mod view;
 pub mod view_input;
 

@@ -3,25 +3,29 @@
 
 mod camera;
 mod files;
+mod frame;
+mod host_times;
 mod inventory;
+mod tally;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use caustica_renderer::gpu::{Acquired, Device, Frames, Image, Recorder};
-use caustica_renderer::{Renderer, RendererOptions, Statistics, ViewId, ViewSettings};
+use caustica_renderer::gpu::{Device, Frames};
+use caustica_renderer::{
+    AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings,
+};
 use caustica_scene::{Document, Edit, EditError, NodeId, ProjectMeta, Target};
 use glam::DVec3;
 
 pub use camera::ViewCamera;
 pub use files::{Loaded, environment_argument, load};
+pub use host_times::{HostTimes, Lap};
+pub use tally::Tally;
 
 use crate::history::History;
-use crate::sync::{Sync, camera_of};
-
-/// A still view stops asking for frames at this many samples.
-const CONVERGED_SAMPLES: u64 = 4096;
+use crate::sync::Sync;
 
 /// Device time of one submit while the window is open: input is answered in between.
 const SUBMIT_BUDGET_MS: f64 = 30.0;
@@ -66,6 +70,9 @@ pub struct Session {
     /// The renderer may hold half of a change: it gets the whole scene again.
     resync: bool,
     picture_revision: u64,
+    profile: ProfileInForce,
+    tally: Tally,
+    host_times: HostTimes,
     device: Arc<Device>,
 }
 
@@ -76,7 +83,9 @@ impl Session {
     /// When memory runs out or the driver refuses.
     pub fn new(device: &Arc<Device>, options: SessionOptions) -> anyhow::Result<Self> {
         let mut frames = Frames::new(device)?;
-        let renderer_options = RendererOptions { shaders: options.shaders, ..RendererOptions::default() };
+        let profile = DeviceProfile::in_force(device.name(), device.driver(), device.kind());
+        let acceleration = AccelPolicy::of(&profile.profile, options.window);
+        let renderer_options = RendererOptions { shaders: options.shaders, acceleration };
         let mut renderer = Renderer::new(device, &mut frames, &renderer_options)?;
         let view = renderer.create_view(options.extent, options.settings, options.window)?;
         if options.window {
@@ -96,6 +105,9 @@ impl Session {
             selection_changed: false,
             resync: false,
             picture_revision: 0,
+            profile,
+            tally: Tally::default(),
+            host_times: HostTimes::default(),
             device: Arc::clone(device),
         })
     }
@@ -103,6 +115,11 @@ impl Session {
     /// The device.
     pub fn device(&self) -> &Arc<Device> {
         &self.device
+    }
+
+    /// What was measured of the device, which decides when structures are refitted, compacted and left for later.
+    pub fn device_profile(&self) -> &ProfileInForce {
+        &self.profile
     }
 
     /// The document.
@@ -198,6 +215,15 @@ impl Session {
     /// # Errors
     /// When the model does not fit; the open document stays as it was.
     pub fn open(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
+        self.open_at(path, loaded, None)
+    }
+
+    /// Like [`Self::open`], in the pose of a time, seconds. A camera of the document is taken where it is then; without
+    /// one the view frames the scene at rest, so that it is the same at all times.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_at(&mut self, path: &Path, loaded: Loaded, time_s: Option<f64>) -> anyhow::Result<()> {
         let opened = files::open(path, loaded)?;
         self.document = opened.document;
         self.meta = opened.meta;
@@ -209,7 +235,31 @@ impl Session {
         }
         self.camera =
             opened.camera.unwrap_or_else(|| ViewCamera::of_document(&self.document, None, self.aspect()));
+        self.set_time(time_s);
+        if opened.camera.is_none()
+            && let Some(camera) = self.document.main_camera()
+        {
+            self.camera = ViewCamera::of_placed(&camera);
+        }
         Ok(())
+    }
+
+    /// Shows the scene at a time, seconds; `None`: at rest. It is no edit: history and file know nothing of it.
+    pub fn set_time(&mut self, time_s: Option<f64>) {
+        if self.document.time() != time_s {
+            self.document.set_time(time_s);
+            self.picture_revision += 1;
+        }
+    }
+
+    /// The time that is shown, seconds; `None`: everything is at rest.
+    pub fn time(&self) -> Option<f64> {
+        self.document.time()
+    }
+
+    /// How long the longest clip lasts that an instance plays, seconds; `None`: nothing is animated.
+    pub fn duration(&self) -> Option<f64> {
+        self.document.animation_duration()
     }
 
     /// Starts an empty document.
@@ -312,149 +362,4 @@ impl Session {
             self.selection_changed = true;
         }
     }
-
-    /// Syncs the document and records one frame of the view, `extent_px` large.
-    ///
-    /// # Errors
-    /// When a shader does not compile or fit, memory runs out, or the device is lost.
-    pub fn begin_frame(&mut self, extent_px: [u32; 2]) -> anyhow::Result<Recorder> {
-        let mut recorder = self.frames.begin()?;
-        self.renderer.note_times(self.view, &self.frames)?;
-        match self.record(&mut recorder, extent_px) {
-            Ok(()) => Ok(recorder),
-            Err(error) => {
-                // Uploads and builds recorded until then count as done: they must reach the device.
-                self.frames.submit(recorder, None)?;
-                Err(error)
-            }
-        }
-    }
-
-    fn record(&mut self, recorder: &mut Recorder, extent_px: [u32; 2]) -> anyhow::Result<()> {
-        if std::mem::take(&mut self.resync) {
-            // Marked first: should this fail too, the next frame still sends everything.
-            self.document.mark_all_added("tried again");
-            self.renderer.apply(recorder, &std::mem::take(&mut self.sync).clear())?;
-        }
-        let delta = self.sync.delta(&mut self.document, self.camera.world_from_camera.translation);
-        let selection_stale = self.selection_changed || !delta.instances.is_empty();
-        if let Err(error) = self.renderer.apply(recorder, &delta) {
-            // Half of the change is in: the next frame sends the whole scene again.
-            self.resync = true;
-            return Err(error.into());
-        }
-        if selection_stale {
-            self.renderer.select(self.view, outlined(&self.document, &self.selection).into_iter())?;
-            self.selection_changed = false;
-        }
-        let camera = camera_of(
-            &self.camera.world_from_camera,
-            self.camera.projection,
-            self.camera.near_m,
-            self.sync.origin(),
-        );
-        let view = self.renderer.view_mut(self.view)?;
-        view.resize(extent_px);
-        view.set_camera(camera);
-        self.renderer.render(recorder, self.view)?;
-        Ok(())
-    }
-
-    /// Starts a frame that leaves the view's image as it was: the window repaints its panels alone.
-    ///
-    /// # Errors
-    /// When the device is lost.
-    pub fn begin_ui_frame(&mut self) -> anyhow::Result<Recorder> {
-        let recorder = self.frames.begin()?;
-        self.renderer.note_times(self.view, &self.frames)?;
-        Ok(recorder)
-    }
-
-    /// Submits a frame.
-    ///
-    /// # Errors
-    /// When the device is lost.
-    pub fn submit(&mut self, recorder: Recorder, window: Option<&Acquired>) -> anyhow::Result<()> {
-        self.frames.submit(recorder, window)?;
-        Ok(())
-    }
-
-    /// Waits for everything submitted and takes the newest times over.
-    ///
-    /// # Errors
-    /// When the device is lost.
-    pub fn finish(&mut self) -> anyhow::Result<()> {
-        self.frames.finish()?;
-        self.renderer.note_times(self.view, &self.frames)?;
-        Ok(())
-    }
-
-    /// The image for the window, holding srgb(x)^2.2; `None` before the first frame.
-    pub fn window_image(&self) -> Option<&Image> {
-        self.renderer.view(self.view).ok().and_then(|view| view.window_image())
-    }
-
-    /// Samples accumulated.
-    pub fn samples(&self) -> u64 {
-        self.renderer.view(self.view).map_or(0, |view| view.samples())
-    }
-
-    /// Whether more frames would hardly change the image.
-    pub fn is_converged(&self) -> bool {
-        self.samples() >= CONVERGED_SAMPLES
-    }
-
-    /// What is seen through a pixel of the last frame. Waits for the device.
-    ///
-    /// # Errors
-    /// When the device is lost.
-    pub fn pick(&mut self, pixel: [u32; 2]) -> anyhow::Result<Option<Pick>> {
-        let Some(hit) = self.renderer.pick(&mut self.frames, self.view, pixel)? else { return Ok(None) };
-        let node = NodeId(hit.instance.node);
-        let is_prefab = self.document.node(node).is_some_and(|node| node.prefab().is_some());
-        let target = if is_prefab { Target::part(node, hit.instance.part) } else { Target::node(node) };
-        let centre = [pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5];
-        let (origin, direction) = self.renderer.camera_ray(self.view, centre)?;
-        let forward = -self.camera.world_from_camera.z_axis.normalize();
-        let world_position = hit.distance_m.map(|distance_m| {
-            let along = f64::from(distance_m) / direction.as_dvec3().dot(forward);
-            self.sync.origin() + origin.as_dvec3() + direction.as_dvec3() * along
-        });
-        Ok(Some(Pick { target, primitive: hit.geometry, world_position }))
-    }
-
-    /// Figures of the last frame.
-    pub fn statistics(&self) -> &Statistics {
-        static NOTHING: std::sync::LazyLock<Statistics> = std::sync::LazyLock::new(Statistics::default);
-        self.renderer.statistics(self.view).unwrap_or(&NOTHING)
-    }
-
-    /// The accumulated radiance. Waits for the device.
-    ///
-    /// # Errors
-    /// When there is no frame yet or the device is lost.
-    pub fn read_back(&mut self) -> anyhow::Result<caustica_renderer::Accumulated> {
-        Ok(self.renderer.read_back(&mut self.frames, self.view)?)
-    }
-
-    /// The tone-mapped image, linear. Waits for the device.
-    ///
-    /// # Errors
-    /// When there is no frame yet or the device is lost.
-    pub fn read_display(&mut self) -> anyhow::Result<Vec<[f32; 4]>> {
-        Ok(self.renderer.read_display(&mut self.frames, self.view)?)
-    }
-}
-
-/// Instances of the selected targets and of everything below them.
-fn outlined(document: &Document, selection: &BTreeSet<Target>) -> Vec<caustica_renderer::delta::InstanceId> {
-    let mut waiting: Vec<Target> = selection.iter().copied().collect();
-    let mut found = Vec::new();
-    while let Some(target) = waiting.pop() {
-        if document.mesh_of(target).is_some() {
-            found.push(crate::sync::instance_id(target));
-        }
-        waiting.extend(document.children_of(target));
-    }
-    found
 }

@@ -1,103 +1,25 @@
 //! What the window remembers between frames and what is no part of the scene: selection, tool, open rows, toasts.
 //! Enters: what the user does in panels. Leaves: plain data for panels and actions. It changes no document.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use caustica_scene::{Document, Finding, Target};
+use caustica_scene::{Finding, MeshId, NodeId, Target};
 
 use crate::app::actions::Action;
 use crate::gizmo::{Drag, Handle, Motion, Space, Start, Tool};
 use crate::log_buffer::LogBuffer;
+use crate::playback::Playback;
 
 mod config;
 mod euler;
 mod rows;
+mod selection;
 
 pub use config::{Config, Tab, default_layout};
 pub use euler::EulerFields;
 pub use rows::{OutlinerState, Row};
-
-/// What is selected. The active target is the one the inspector shows.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Selection {
-    targets: BTreeSet<Target>,
-    active: Option<Target>,
-}
-
-impl Selection {
-    /// Everything selected.
-    pub fn targets(&self) -> &BTreeSet<Target> {
-        &self.targets
-    }
-
-    /// The one selected last.
-    pub fn active(&self) -> Option<Target> {
-        self.active
-    }
-
-    /// Whether a target is selected.
-    pub fn contains(&self, target: Target) -> bool {
-        self.targets.contains(&target)
-    }
-
-    /// Whether nothing is selected.
-    pub fn is_empty(&self) -> bool {
-        self.targets.is_empty()
-    }
-
-    /// Selects nothing.
-    pub fn clear(&mut self) {
-        self.targets.clear();
-        self.active = None;
-    }
-
-    /// Selects this alone.
-    pub fn set(&mut self, target: Target) {
-        self.targets = BTreeSet::from([target]);
-        self.active = Some(target);
-    }
-
-    /// Selects these; the last one becomes active.
-    pub fn set_all(&mut self, targets: impl IntoIterator<Item = Target>) {
-        self.clear();
-        for target in targets {
-            self.add(target);
-        }
-    }
-
-    /// Selects this too.
-    pub fn add(&mut self, target: Target) {
-        self.targets.insert(target);
-        self.active = Some(target);
-    }
-
-    /// Selects or deselects this and leaves the rest.
-    pub fn toggle(&mut self, target: Target) {
-        if self.targets.remove(&target) {
-            self.active = self.targets.last().copied();
-        } else {
-            self.add(target);
-        }
-    }
-
-    /// Drops what is no longer in the document.
-    pub fn retain_in(&mut self, document: &Document) {
-        self.targets.retain(|target| document.contains(*target));
-        if self.active.is_some_and(|target| !self.targets.contains(&target)) {
-            self.active = self.targets.last().copied();
-        }
-    }
-
-    /// The selected targets that hang below no other selected one: what a move has to touch.
-    pub fn tops(&self, document: &Document) -> Vec<Target> {
-        let below_another = |target: Target| {
-            std::iter::successors(document.parent_of(target), |&t| document.parent_of(t))
-                .any(|t| self.targets.contains(&t))
-        };
-        self.targets.iter().copied().filter(|&target| !below_another(target)).collect()
-    }
-}
+pub use selection::{SelectedPrimitive, Selection};
 
 /// How bad a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,13 +84,22 @@ impl Toasts {
     }
 }
 
+/// What a drag of the gizmo moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Moved {
+    /// An object.
+    Object(Target),
+    /// A primitive inside its mesh, wherever that is placed.
+    Primitive(MeshId, u32),
+}
+
 /// A drag of the gizmo.
 #[derive(Clone, Debug)]
 pub struct GizmoDrag {
     /// The handle and where it was taken.
     pub drag: Drag,
     /// What moves, as it was at the start.
-    pub starts: Vec<(Target, Start)>,
+    pub starts: Vec<(Moved, Start)>,
     /// What it did so far.
     pub motion: Option<Motion>,
 }
@@ -238,6 +169,8 @@ pub enum HelpWindow {
 pub struct InspectorState {
     /// Angles as they are shown, so that they do not jump while they are edited.
     pub euler: EulerFields,
+    /// The same for the selected primitive.
+    pub primitive_euler: EulerFields,
     /// A name that is being typed, and whose.
     pub name: Option<(Target, String)>,
     /// Scale fields change together.
@@ -266,6 +199,10 @@ pub struct UiState {
     pub snap: bool,
     /// The view.
     pub view: ViewState,
+    /// How the animation plays.
+    pub playback: Playback,
+    /// Instances with clips, and the `History::structure_revision` that they were collected at.
+    pub animated: Option<(u64, Vec<NodeId>)>,
     /// The outliner.
     pub outliner: OutlinerState,
     /// The inspector.
@@ -286,44 +223,4 @@ pub struct UiState {
     pub health: Option<Health>,
     /// Smoothed milliseconds of each pass.
     pub pass_ms: BTreeMap<String, f64>,
-}
-
-#[cfg(test)]
-mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-    use caustica_scene::{Node, NodeKind};
-
-    use super::*;
-
-    #[test]
-    fn tops_leave_out_what_moves_with_its_parent() {
-        let mut document = Document::new();
-        let add = |document: &mut Document, parent| {
-            let (id, edit) = document.add_edit(Node::new("n", NodeKind::Group), parent);
-            document.apply(edit).unwrap();
-            id
-        };
-        let root = add(&mut document, None);
-        let child = add(&mut document, Some(root));
-        let grandchild = add(&mut document, Some(child));
-        let other = add(&mut document, None);
-        let mut selection = Selection::default();
-        selection.set_all([grandchild, root, other].map(Target::node));
-        assert_eq!(selection.tops(&document), [root, other].map(Target::node));
-        assert_eq!(selection.active(), Some(Target::node(other)));
-    }
-
-    #[test]
-    fn toggling_moves_the_active_target_on() {
-        let (a, b) = (Target::part(caustica_scene::NodeId(1), 0), Target::part(caustica_scene::NodeId(1), 1));
-        let mut selection = Selection::default();
-        selection.set(a);
-        selection.toggle(b);
-        assert_eq!(selection.active(), Some(b));
-        selection.toggle(b);
-        assert_eq!(selection.active(), Some(a));
-        selection.retain_in(&Document::new());
-        assert!(selection.is_empty() && selection.active().is_none());
-    }
 }

@@ -40,8 +40,13 @@ pub(crate) struct Accel {
     groups: tlas::Groups,
     /// Updates so far.
     frame: u64,
+    /// No background work before this update.
+    try_again_at: u64,
     statistics: AccelStatistics,
 }
+
+/// So many frames after memory did not suffice for background work it is tried again.
+const TRY_AGAIN_FRAMES: u64 = 600;
 
 impl Accel {
     /// # Errors
@@ -62,6 +67,7 @@ impl Accel {
             scratch: Scratch::new(device),
             groups,
             frame: 0,
+            try_again_at: 0,
             statistics: AccelStatistics::default(),
         })
     }
@@ -82,13 +88,13 @@ impl Accel {
         self.statistics.forget_frame();
         let mut dirty = Dirty::default();
         self.follow(tables, changed, &mut dirty);
-        self.blases.decayed.extend(self.surfaces.read(self.frame));
-        let adopted = self.later.step(&mut self.blases, &self.policy)?;
+        self.blases.decayed.extend(self.surfaces.read());
+        let adopted = self.step_later()?;
         let jobs = self.plan(tables, changed, &adopted)?;
         dirty.bounds = !jobs.is_empty();
         dirty.addresses = !adopted.swapped.is_empty();
         self.build(recorder, tables, jobs, &mut dirty)?;
-        self.surfaces.record(recorder, tables, &self.blases, &passes.blas_surface, self.frame)?;
+        self.surfaces.record(recorder, tables, &self.blases, &passes.blas_surface)?;
         if adopted.appeared {
             // An instance that waited for its BLAS becomes active: its record names a structure now.
             dirty.slots = (0..tables.instances.slot_count()).collect();
@@ -99,9 +105,35 @@ impl Accel {
             self.statistics.tlas =
                 self.tlas.update(recorder, tables, &mut self.blases, dirty, policy, pass, scratch, groups)?;
         }
-        self.later.prepare(recorder, tables, &self.blases, &self.policy, self.frame)?;
+        self.prepare_later(recorder, tables)?;
         self.note(tables, &adopted);
         Ok(adopted.appeared)
+    }
+
+    /// Submits what the last frame prepared and takes into use what the background has finished.
+    fn step_later(&mut self) -> Result<Adopted> {
+        let stepped = self.later.step(&mut self.blases, &self.policy);
+        self.spare_memory(stepped)
+    }
+
+    fn prepare_later(&mut self, recorder: &mut Recorder, tables: &Tables) -> Result<()> {
+        if self.frame < self.try_again_at {
+            return Ok(());
+        }
+        let prepared = self.later.prepare(recorder, tables, &self.blases, &self.policy, self.frame);
+        self.spare_memory(prepared)
+    }
+
+    /// What only makes structures better may fail for want of memory: it is tried again after a while.
+    fn spare_memory<T: Default>(&mut self, result: Result<T>) -> Result<T> {
+        match result {
+            Err(error) if error.is_out_of_memory() && self.blases.waiting.is_empty() => {
+                tracing::warn!("acceleration structures stay as they are: {error}");
+                self.try_again_at = self.frame + TRY_AGAIN_FRAMES;
+                Ok(T::default())
+            }
+            other => other,
+        }
     }
 
     /// Gives every slot that changed the BLAS that it needs now.
@@ -169,7 +201,7 @@ impl Accel {
             let deforms = blas.key.deforming.is_some();
             let edited = changed.reshaped.contains(&blas.key.mesh);
             let form = if deforms || edited { Form::Dynamic } else { Form::Static { compacted: false } };
-            let own = tables.meshes.get(blas.key.mesh)?.triangle_count();
+            let own = tables.meshes.get(blas.key.mesh)?.element_count();
             if !deforms && !self.policy.fits_frame(triangles, own) {
                 self.blases.wait_for_background(number);
                 continue;
@@ -254,7 +286,9 @@ impl Accel {
 
     /// Whether work is left to later frames.
     pub(crate) fn is_busy(&self) -> bool {
-        self.later.is_busy() || !self.blases.waiting.is_empty() || !self.blases.decayed.is_empty()
+        let may_try = self.frame >= self.try_again_at;
+        let wanted = !self.blases.waiting.is_empty() || !self.blases.decayed.is_empty();
+        self.later.is_busy() || (wanted && may_try)
     }
 
     /// Puts the TLAS into the set of a frame that is free to record.

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Vec3};
 
 pub use material::{AlphaMode, Material, Sampler, ShadingMode, Texture, TextureUse, Wrap};
-pub use mesh::{Deformation, Geometry, Mesh, MorphTarget, Pose};
+pub use mesh::{Deformation, Geometry, Mesh, MorphTarget, Pose, Shape, ShapeKind};
 
 /// Persistent id of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

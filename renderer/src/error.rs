@@ -50,6 +50,14 @@ pub enum RendererError {
         /// What does not fit.
         reason: String,
     },
+    /// The shapes of a mesh are none.
+    #[error("mesh '{mesh}' cannot hold its shapes: {reason}")]
+    Shapes {
+        /// Name of the mesh.
+        mesh: String,
+        /// What is wrong with them.
+        reason: String,
+    },
     /// An id that is not in the tables.
     #[error("{what} {id} is not in the scene")]
     Unknown {
@@ -72,6 +80,13 @@ pub enum RendererError {
         /// Why.
         reason: String,
     },
+}
+
+impl RendererError {
+    /// Whether memory ran out: less of it may do.
+    pub(crate) fn is_out_of_memory(&self) -> bool {
+        matches!(self, Self::Gpu(GpuError::OutOfMemory { .. }))
+    }
 }
 
 /// Result of this package.

@@ -76,7 +76,7 @@ twins! {
 
     /// One geometry of a mesh: a run of triangles with one material.
     struct Geometry, size 144 {
-        /// Device address of `vec3[]`, 12 bytes each, primitive space in metres.
+        /// Device address of `vec3[]`, 12 bytes each, primitive space in metres; or of [`Shape`] `[triangle_count]`.
         0 positions: u64,
         /// The same of the last frame; equal to `positions` unless the mesh deforms.
         8 previous_positions: u64,
@@ -84,7 +84,7 @@ twins! {
         16 attributes: u64,
         /// Device address of `u32[]`, already moved to the first index of this geometry.
         24 indices: u64,
-        /// Number of triangles.
+        /// Number of triangles, or of shapes.
         32 triangle_count: u32,
         /// `GEOMETRY_*` bits.
         36 flags: u32,
@@ -96,6 +96,16 @@ twins! {
         48 mesh_from_primitive: Rows,
         /// The same of the last frame.
         96 previous_mesh_from_primitive: Rows,
+    }
+
+    /// A sphere or a box, primitive space.
+    struct Shape, size 28 {
+        /// Metres.
+        0 centre: [f32; 3],
+        /// `SHAPE_*`.
+        12 kind: u32,
+        /// Metres; of a sphere the radius, three times. A size of 0: rays never meet it.
+        16 half_extent: [f32; 3],
     }
 
     /// What a vertex carries beside its position.
@@ -402,6 +412,26 @@ twins! {
         20 pad0: u32,
     }
 
+    /// One geometry of a mesh of shapes whose boxes are made.
+    struct ShapeBoxJob, size 24 {
+        /// Its [`Geometry`].
+        0 geometry: u64,
+        /// [`ShapeBox`] a shape.
+        8 boxes: u64,
+        /// Number of shapes.
+        16 count: u32,
+        /// Zero.
+        20 pad0: u32,
+    }
+
+    /// VkAabbPositionsKHR, mesh space.
+    struct ShapeBox, size 24 {
+        /// Smallest coordinates.
+        0 low: [f32; 3],
+        /// Largest coordinates.
+        12 high: [f32; 3],
+    }
+
     /// Which instance descriptors are written.
     struct InstanceDescriptorJob, size 48 {
         /// [`Instance`] by slot.
@@ -424,7 +454,7 @@ twins! {
     struct TlasSlot, size 12 {
         /// Number of its BLAS, or [`TLAS_NO_BLAS`].
         0 blas: u32,
-        /// Bits 0..8: `MASK_*`; bits 8..16: VkGeometryInstanceFlagsKHR.
+        /// Bits 0..8: `MASK_*`; bits 8..16: VkGeometryInstanceFlagsKHR; bits 16..24: SBT offset.
         4 mask_flags: u32,
         /// Of its descriptor.
         8 place: u32,
@@ -436,7 +466,7 @@ twins! {
         0 render_from_mesh: Rows,
         /// Bits 0..24: slot; bits 24..32: mask.
         48 index_mask: u32,
-        /// Bits 24..32: flags.
+        /// Bits 0..24: SBT offset; bits 24..32: flags.
         52 offset_flags: u32,
         /// Device address of the BLAS; 0: rays never meet it.
         56 blas: u64,

@@ -37,6 +37,8 @@ pub struct SceneSummary {
     pub alpha: bool,
     /// Some geometry is not opaque to rays.
     pub any_hit: bool,
+    /// Some mesh holds spheres or boxes.
+    pub shapes: bool,
 }
 
 impl SceneSummary {
@@ -100,6 +102,10 @@ pub struct Needs {
     pub temporal: bool,
     /// Motion vectors.
     pub motion: bool,
+    /// Spheres and boxes: false in the raster pipeline, which does not draw them.
+    pub shapes: bool,
+    /// Rays find the primary surfaces, not the rasteriser.
+    pub primary_rays: bool,
 }
 
 impl Needs {
@@ -129,6 +135,8 @@ impl Needs {
             shadow_rays: rays,
             temporal: settings.temporal && rays && (all || noisy),
             motion: all || settings.show == Show::Motion || (settings.temporal && rays && noisy),
+            shapes: rays && (all || scene.shapes),
+            primary_rays: settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
         }
     }
 
@@ -156,6 +164,7 @@ impl Needs {
             self.emission,
             self.shadow_rays,
             self.motion,
+            self.shapes,
         ];
         Specialization {
             values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),
@@ -175,7 +184,7 @@ impl Needs {
                 nothing
             }
         };
-        let list: [(bool, &str, &str); 13] = [
+        let list: [(bool, &str, &str); 15] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -196,6 +205,20 @@ impl Needs {
             (self.emission, "emissive target", "no surface emits"),
             (self.motion, "motion vectors", "nothing is denoised over time"),
             (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),
+            (
+                self.shapes,
+                "spheres and boxes",
+                if rays {
+                    "every mesh is made of triangles"
+                } else {
+                    "rays alone meet them, and the raster pipeline casts none"
+                },
+            ),
+            (
+                settings.pipeline != Pipeline::Hybrid || !self.primary_rays,
+                "raster of primary surfaces",
+                "the scene holds spheres or boxes, which rays alone meet",
+            ),
             (
                 self.temporal,
                 "temporal denoising",

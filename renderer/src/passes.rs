@@ -9,6 +9,7 @@ mod instance_descriptors;
 mod post;
 mod shading;
 mod shadow;
+mod shape_boxes;
 mod temporal;
 
 use std::ops::Range;
@@ -27,14 +28,14 @@ pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
 pub(crate) use post::Post;
 pub(crate) use shading::Shading;
 pub(crate) use shadow::Shadow;
+pub(crate) use shape_boxes::ShapeBoxes;
 pub(crate) use temporal::Temporal;
 
 use crate::accel::Accel;
 use crate::error::Result;
 use crate::gpu_types::Push;
 use crate::needs::Needs;
-use crate::settings::Pipeline;
-use crate::shader::{ShaderLibrary, merge_interfaces};
+use crate::shader::{Compiled, ShaderLibrary, merge_interfaces};
 use crate::tables::Tables;
 
 /// Builds pipelines for one set of needs.
@@ -63,36 +64,44 @@ impl Builder<'_> {
     /// A ray-tracing pipeline around one ray generation shader; the other stages are the same for all.
     fn rays(&mut self, label: &str, file: &str) -> Result<RayTracingPipeline> {
         let generation = self.library.stage(file)?;
-        let surface_hit = self.library.stage("passes/rays/surface.rchit")?;
         let surface_miss = self.library.stage("passes/rays/surface.rmiss")?;
         let shadow_miss = self.library.stage("passes/rays/shadow.rmiss")?;
-        let any_hits = if self.needs.any_hit {
-            Some((
-                self.library.stage("passes/rays/surface.rahit")?,
-                self.library.stage("passes/rays/shadow.rahit")?,
-            ))
-        } else {
-            None
-        };
-        let mut stages = vec![&*generation, &*surface_hit, &*surface_miss, &*shadow_miss];
-        if let Some((surface, shadow)) = &any_hits {
-            stages.extend([&**surface, &**shadow]);
+        let surface_hit = self.library.stage("passes/rays/surface.rchit")?;
+        let surface_any = self.optional(self.needs.any_hit, "passes/rays/surface.rahit")?;
+        let shadow_any = self.optional(self.needs.any_hit, "passes/rays/shadow.rahit")?;
+        let shape_hit = self.optional(self.needs.shapes, "passes/rays/shape.rchit")?;
+        let shape_intersection = self.optional(self.needs.shapes, "passes/rays/shape.rint")?;
+        let mut stages = vec![&*generation, &*surface_miss, &*shadow_miss, &*surface_hit];
+        for stage in [&surface_any, &shadow_any, &shape_hit, &shape_intersection] {
+            stages.extend(stage.as_deref());
         }
         let interface = merge_interfaces(&stages)?;
-        let (surface_any, shadow_any) = match &any_hits {
-            Some((surface, shadow)) => (Some(&surface.module), Some(&shadow.module)),
-            None => (None, None),
+        let [surface_any, shadow_any, shape_hit, shape_intersection] =
+            [&surface_any, &shadow_any, &shape_hit, &shape_intersection]
+                .map(|stage| stage.as_deref().map(|stage| &stage.module));
+        // In the order of RAY_SURFACE and RAY_SHADOW; then the same for shapes (RAY_SHAPES).
+        let of_kind = |closest_hit, intersection| {
+            [(closest_hit, surface_any), (None, shadow_any)].map(|(closest_hit, any_hit)| HitGroup {
+                closest_hit,
+                any_hit,
+                intersection,
+            })
         };
+        let mut hit_groups = of_kind(Some(&surface_hit.module), None).to_vec();
+        if shape_intersection.is_some() {
+            hit_groups.extend(of_kind(shape_hit, shape_intersection));
+        }
         let desc = RayTracingDesc {
             name: label,
             ray_generation: &generation.module,
             misses: &[&surface_miss.module, &shadow_miss.module],
-            hit_groups: &[
-                HitGroup { closest_hit: Some(&surface_hit.module), any_hit: surface_any, intersection: None },
-                HitGroup { closest_hit: None, any_hit: shadow_any, intersection: None },
-            ],
+            hit_groups: &hit_groups,
         };
         Ok(RayTracingPipeline::new(self.device, &desc, &interface, &self.specialization, Some(self.set))?)
+    }
+
+    fn optional(&mut self, wanted: bool, file: &str) -> Result<Option<Arc<Compiled>>> {
+        wanted.then(|| self.library.stage(file)).transpose()
     }
 }
 
@@ -179,6 +188,7 @@ pub(crate) struct ScenePasses {
     pub(crate) blas_surface: BlasSurface,
     pub(crate) deform: Deform,
     pub(crate) instance_descriptors: InstanceDescriptors,
+    pub(crate) shape_boxes: ShapeBoxes,
 }
 
 impl ScenePasses {
@@ -187,6 +197,7 @@ impl ScenePasses {
             blas_surface: BlasSurface::new(device, library)?,
             deform: Deform::new(device, library)?,
             instance_descriptors: InstanceDescriptors::new(device, library)?,
+            shape_boxes: ShapeBoxes::new(device, library)?,
         })
     }
 }
@@ -202,10 +213,10 @@ pub(crate) struct PassSet {
 }
 
 impl PassSet {
-    pub(crate) fn new(builder: &mut Builder<'_>, pipeline: Pipeline) -> Result<Self> {
+    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
         let needs = builder.needs;
         Ok(Self {
-            gbuffer: GBuffer::new(builder, pipeline)?,
+            gbuffer: GBuffer::new(builder)?,
             shadow: needs.direct_light().then(|| Shadow::new(builder)).transpose()?,
             temporal: (needs.temporal && needs.direct_light()).then(|| Temporal::new(builder)).transpose()?,
             shading: Shading::new(builder)?,

@@ -115,7 +115,7 @@ impl Renderer {
         }
         let slot = recorder.slot();
         let mut changed = std::mem::take(&mut self.changed);
-        if let Err(error) = self.tables.flush(recorder, &self.scene_passes.deform, &mut changed) {
+        if let Err(error) = self.tables.flush(recorder, &self.scene_passes, &mut changed) {
             self.changed = Changed { all: true, ..changed };
             return Err(error);
         }
@@ -259,7 +259,7 @@ impl Renderer {
         };
         let passes = match self.passes.entry((pipeline, needs)) {
             Entry::Occupied(entry) => entry.into_mut(),
-            Entry::Vacant(entry) => entry.insert(PassSet::new(&mut builder, pipeline)?),
+            Entry::Vacant(entry) => entry.insert(PassSet::new(&mut builder)?),
         };
         passes.post.prepare(&mut builder, show, window)
     }
@@ -366,6 +366,7 @@ fn summarize(tables: &Tables) -> SceneSummary {
         emissive_triangles: tables.emissive.len(),
         environment: tables.environment.shines(),
         environment_map: tables.environment.is_map() && tables.environment.shines(),
+        shapes: tables.meshes.hold_shapes(),
         ..SceneSummary::without_materials()
     };
     let mut used: Vec<MaterialId> = tables.instances.materials_in_use().collect();

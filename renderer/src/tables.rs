@@ -12,6 +12,7 @@ mod instances;
 mod lights;
 mod materials;
 mod meshes;
+mod shapes;
 mod snapshot;
 mod spatial_order;
 mod table;
@@ -33,7 +34,7 @@ pub(crate) use table::{Download, Table};
 use crate::delta::{InstanceId, MeshId};
 use crate::error::Result;
 use crate::gpu_types;
-use crate::passes::Deform;
+use crate::passes::ScenePasses;
 
 use deforming::Deforming;
 use draws::Draws;
@@ -110,7 +111,7 @@ impl Tables {
     pub(crate) fn flush(
         &mut self,
         recorder: &mut Recorder,
-        deform: &Deform,
+        passes: &ScenePasses,
         changed: &mut Changed,
     ) -> Result<()> {
         let waits = [
@@ -128,6 +129,7 @@ impl Tables {
             recorder.declare(&[Use::Group(self.geometry_group, Stage::Transfer, Access::TransferWrite)]);
             self.meshes.flush(recorder)?;
         }
+        self.meshes.make_boxes(recorder, &passes.shape_boxes, self.geometry_group)?;
         self.instances.flush(recorder)?;
         self.materials.flush(recorder)?;
         self.lights.flush(recorder)?;
@@ -140,7 +142,7 @@ impl Tables {
             self.scene.set(0, record);
             self.scene.flush(recorder)?;
         }
-        changed.deformed.extend(self.deforming.record(recorder, deform, self.geometry_group)?);
+        changed.deformed.extend(self.deforming.record(recorder, &passes.deform, self.geometry_group)?);
         Ok(())
     }
 
@@ -176,11 +178,14 @@ impl Tables {
     ) -> Result<Snapshot> {
         let mesh = self.meshes.get(mesh)?;
         let posed = deforming.and_then(|id| self.deforming.get(id));
+        if let Some(shapes) = &mesh.shapes {
+            return Snapshot::of_shapes(recorder, shapes, self.geometry_group);
+        }
         let (records, positions) = match posed {
             Some(posed) => (&posed.geometries, Some(&posed.positions)),
             None => (&mesh.geometries, None),
         };
-        Snapshot::new(recorder, &mesh.vertices, records, positions, self.geometry_group)
+        Snapshot::of_triangles(recorder, &mesh.vertices, records, positions, self.geometry_group)
     }
 
     /// Records the copy of the `Scene` record back to the host.

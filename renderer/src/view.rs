@@ -220,7 +220,7 @@ impl View {
         let wanted = (needs, self.settings.pipeline);
         if self.targets.as_ref().is_none_or(|(made_for, _)| *made_for != wanted) {
             self.drop_targets();
-            let targets = Targets::new(&self.device, self.extent, &needs, &self.settings, self.window)?;
+            let targets = Targets::new(&self.device, self.extent, &needs, self.window)?;
             self.targets = Some((wanted, targets));
         }
         if self.accumulator.is_none() {

@@ -1,6 +1,6 @@
 // The G-buffer: what a camera ray or a fragment writes, and how later passes read it back as a Surface.
-// In: pixel, instance slot, geometry, primitive. Out: the values of all targets. Raster and camera rays share this code, so they agree.
-// The point is where the pixel's line meets the triangle: nothing depends on interpolation or on the precision of the depth target.
+// In: pixel, instance slot, geometry (of a shape seen from inside with GBUFFER_BACK), primitive. Out: the values of all targets. Raster and camera rays share this code, so they agree.
+// The point is where the pixel's line meets the triangle or shape: nothing depends on interpolation or on the precision of the depth target.
 #ifndef LIB_GBUFFER
 #define LIB_GBUFFER
 
@@ -27,9 +27,27 @@ vec4 gbuffer_uv_gradient(vec2 edge1, vec2 edge2, vec2 right, vec2 down) {
     return vec4(edge1 * right.x + edge2 * right.y, edge1 * down.x + edge2 * down.y);
 }
 
-TexturePoint gbuffer_texture_point(Frame frame, vec2 position_px, Triangle triangle, Attributes attributes, vec2 line_at) {
+// Change of a shape's texture coordinates from here to where a line meets the tangent plane.
+vec2 gbuffer_shape_uv_step(PlacedShape shape, ShapePlace place, CameraRay ray) {
+    vec3 origin = ray.origin;
+    vec3 direction = ray.direction;
+    if (!shape_line(shape, origin, direction)) {
+        return vec2(0.0);
+    }
+    vec3 along = origin + (dot(place.unit - origin, place.normal) / dot(direction, place.normal)) * direction - place.unit;
+    return is_finite(along) ? shape_uv_step(shape.kind, place, along) : vec2(0.0);
+}
+
+TexturePoint gbuffer_texture_point(Frame frame, vec2 position_px, Element element, Attributes attributes) {
     CameraRay right_ray = camera_ray(frame, position_px + vec2(1.0, 0.0));
     CameraRay down_ray = camera_ray(frame, position_px + vec2(0.0, 1.0));
+    if (element.is_shape) {
+        vec4 gradient = vec4(gbuffer_shape_uv_step(element.shape, element.place, right_ray),
+            gbuffer_shape_uv_step(element.shape, element.place, down_ray));
+        return TexturePoint(attributes.uv, vec4[2](gradient, gradient));
+    }
+    Triangle triangle = element.triangle;
+    vec2 line_at = element.line_at;
     vec2 right = triangle_line_barycentric(triangle, right_ray.origin, right_ray.direction) - line_at;
     vec2 down = triangle_line_barycentric(triangle, down_ray.origin, down_ray.direction) - line_at;
     AttributeTable table = AttributeTable(triangle.attributes);
@@ -47,21 +65,20 @@ TexturePoint gbuffer_texture_point(Frame frame, vec2 position_px, Triangle trian
 GbufferPixel gbuffer_pixel(Frame frame, Scene scene, uvec2 pixel, uint instance_slot, uint geometry, uint primitive) {
     vec2 position_px = camera_sample_position(frame, pixel);
     CameraRay ray = camera_ray(frame, position_px);
-    Triangle triangle = triangle_fetch(scene, instance_slot, geometry, primitive);
-    vec2 line_at = triangle_line_barycentric(triangle, ray.origin, ray.direction);
-    vec2 barycentric = clamp_barycentric(line_at);
-    SurfacePoint point = triangle_point(triangle, barycentric);
-    Attributes attributes = triangle_attributes(scene, instance_slot, triangle, barycentric);
-    TexturePoint textures_at = gbuffer_texture_point(frame, position_px, triangle, attributes, line_at);
-    uint material_slot = material_index(scene, instance_slot, geometry);
+    Element element = element_on_line(scene, instance_slot, geometry, primitive, ray.origin, ray.direction);
+    SurfacePoint point = element_point(element);
+    Attributes attributes = element_attributes(scene, instance_slot, element);
+    TexturePoint textures_at = gbuffer_texture_point(frame, position_px, element, attributes);
+    uint geometry_index = geometry & ~GBUFFER_BACK;
+    uint material_slot = material_index(scene, instance_slot, geometry_index);
     Material material = MaterialTable(scene.materials).at[material_slot];
-    bool front = dot(point.normal, ray.direction) < 0.0;
+    bool front = element.is_shape ? geometry == geometry_index : dot(point.normal, ray.direction) < 0.0;
     Surface surface = surface_shade(material, point, front, attributes, textures_at, -ray.direction);
 
     vec4 clip = frame.clip_from_render_unjittered * vec4(point.position, 1.0);
-    vec3 previous = triangle_previous_position(scene, instance_slot, geometry, triangle, barycentric);
+    vec3 previous = element_previous_position(scene, instance_slot, geometry_index, element);
     GbufferPixel result;
-    result.id = uvec4(instance_slot + 1u, geometry | (front ? 0u : GBUFFER_BACK), primitive, material_slot);
+    result.id = uvec4(instance_slot + 1u, geometry_index | (front ? 0u : GBUFFER_BACK), primitive, material_slot);
     result.normal = uvec2(octahedral_encode(surface.shading_normal), octahedral_encode(surface.geometric_normal));
     result.base_color = vec4(surface.base_color, surface.occlusion);
     result.material = vec2(surface.metallic, surface.roughness);
@@ -77,9 +94,7 @@ GbufferPixel gbuffer_pixel(Frame frame, Scene scene, uvec2 pixel, uint instance_
 // The surface of a pixel from its targets; id.x > 0.
 Surface surface_from_gbuffer(Frame frame, Scene scene, uvec2 pixel, uvec4 id, uvec2 normal, vec4 base_color, vec2 metallic_roughness) {
     CameraRay ray = camera_ray(frame, camera_sample_position(frame, pixel));
-    Triangle triangle = triangle_fetch(scene, id.x - 1u, id.y & ~GBUFFER_BACK, id.z);
-    vec2 barycentric = clamp_barycentric(triangle_line_barycentric(triangle, ray.origin, ray.direction));
-    SurfacePoint point = triangle_point(triangle, barycentric);
+    SurfacePoint point = element_point(element_on_line(scene, id.x - 1u, id.y, id.z, ray.origin, ray.direction));
     Material material = MaterialTable(scene.materials).at[id.w];
     Surface surface;
     surface.position = point.position;

@@ -6,12 +6,12 @@
 #include "shared/scene.glsl"
 #include "lib/basis.glsl"
 #include "lib/brdf.glsl"
+#include "lib/element.glsl"
 #include "lib/material.glsl"
 #include "lib/random.glsl"
-#include "lib/triangle.glsl"
 
 struct Surface {
-    vec3 position;          // on the triangle, render space
+    vec3 position;          // on the triangle or shape, render space
     float offset_m;         // see lib/ray_offset.glsl
     vec3 geometric_normal;  // unit, on the viewer's side
     vec3 shading_normal;    // unit, on the viewer's side; the mirror direction about it stays above the triangle
@@ -104,15 +104,14 @@ Surface surface_shade(Material material, SurfacePoint point, bool front, Attribu
 #ifndef SURFACE_GRADIENTS
 // Surface at a hit of a secondary ray. travel: unit direction of the ray; cone_width_m: of the ray cone at the hit.
 Surface surface_from_hit(Scene scene, Hit hit, vec3 travel, float cone_width_m) {
-    Triangle triangle = triangle_fetch(scene, hit.instance, hit.geometry, hit.primitive);
-    SurfacePoint point = triangle_point(triangle, hit.barycentric);
-    Attributes attributes = triangle_attributes(scene, hit.instance, triangle, hit.barycentric);
+    Element element = element_fetch(scene, hit);
+    SurfacePoint point = element_point(element);
+    Attributes attributes = element_attributes(scene, hit.instance, element);
     Material material = MaterialTable(scene.materials).at[material_index(scene, hit.instance, hit.geometry)];
     float cosine = dot(point.normal, travel);
     TexturePoint textures_at;
     textures_at.uv = attributes.uv;
-    vec2 uv_area = triangle_double_uv_area(triangle) / triangle_double_area(triangle)
-        * (cone_width_m * cone_width_m / abs(cosine));
+    vec2 uv_area = element_uv_density(element) * (cone_width_m * cone_width_m / abs(cosine));
     textures_at.uv_area = float[2](uv_area.x, uv_area.y); // infinite or NaN where degenerate or edge-on; sample_texture sorts it out
     return surface_shade(material, point, cosine < 0.0, attributes, textures_at, -travel);
 }
@@ -122,8 +121,7 @@ float hit_coverage(Scene scene, Hit hit, Material material) {
     if ((material.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND)) == 0u) {
         return 1.0;
     }
-    Triangle triangle = triangle_fetch(scene, hit.instance, hit.geometry, hit.primitive);
-    Attributes attributes = triangle_attributes(scene, hit.instance, triangle, hit.barycentric);
+    Attributes attributes = element_attributes(scene, hit.instance, element_fetch(scene, hit));
     TexturePoint textures_at;
     textures_at.uv = attributes.uv;
     textures_at.uv_area = float[2](0.0, 0.0);
@@ -131,7 +129,7 @@ float hit_coverage(Scene scene, Hit hit, Material material) {
 }
 #endif
 
-// A number in [0, 1) that belongs to one triangle as one ray or pixel sees it.
+// A number in [0, 1) that belongs to one triangle, or one side of a shape, as one ray or pixel sees it.
 float coverage_threshold(uint seed, uint instance, uint geometry, uint primitive) {
     return unit_float(hash_pcg4d(uvec4(seed, instance, geometry, primitive)).x);
 }

@@ -20,7 +20,7 @@ struct InstanceDescriptorJob {
 // What the TLAS knows of a slot beside its transform.
 struct TlasSlot {
     uint blas;              // number of its BLAS, or TLAS_NO_BLAS
-    uint mask_flags;        // bits 0..8: MASK_*, bits 8..16: VkGeometryInstanceFlagsKHR
+    uint mask_flags;        // bits 0..8: MASK_*, bits 8..16: VkGeometryInstanceFlagsKHR, bits 16..24: SBT offset
     uint place;             // of its descriptor
 };
 
@@ -28,7 +28,7 @@ struct TlasSlot {
 struct InstanceDescriptor {
     vec4 render_from_mesh[3];
     uint index_mask;        // bits 0..24: slot, bits 24..32: mask
-    uint offset_flags;      // bits 0..24: 0, bits 24..32: flags
+    uint offset_flags;      // bits 0..24: SBT offset, bits 24..32: flags
     uint64_t blas;          // 0: rays never meet it
 };
 

@@ -14,5 +14,6 @@ layout(constant_id = 7) const bool NEEDS_REFRACTION = true;          // any surf
 layout(constant_id = 8) const bool NEEDS_EMISSION = true;            // any material emits or is unlit
 layout(constant_id = 9) const bool NEEDS_SHADOW_RAYS = true;         // false in the raster pipeline
 layout(constant_id = 10) const bool NEEDS_MOTION = true;             // motion vectors are read
+layout(constant_id = 11) const bool NEEDS_SHAPES = true;             // some mesh holds spheres or boxes instead of triangles
 
 #endif

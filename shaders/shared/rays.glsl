@@ -10,6 +10,14 @@ layout(set = 0, binding = 0) uniform accelerationStructureEXT scene_tlas;
 // SBT offsets of the ray kinds: hit groups and miss shaders stand in this order; the geometry stride is 0.
 const uint RAY_SURFACE = 0u;
 const uint RAY_SHADOW = 1u;
+// Hit groups of meshes of shapes stand so much further: the SBT offset of their instances.
+const uint RAY_SHAPES = 2u;
+
+// Hit kinds that shape.rint reports: which shape, and whether the ray leaves it there.
+const uint HIT_SPHERE = 0u;
+const uint HIT_BOX = 1u;
+const uint HIT_LEAVING = 2u;
+const uint HIT_KINDS = 4u;          // kinds below this are of shapes
 
 // Bits of the instance masks, one a kind of ray. A hidden instance has none.
 const uint MASK_CAMERA = 1u;
@@ -22,7 +30,7 @@ struct SurfacePayload {
     uint instance;
     uint geometry;
     uint primitive;
-    vec2 barycentric;   // weights of the second and third vertex
+    vec2 barycentric;   // weights of the second and third vertex; of a shape: the place on it (lib/shape.glsl)
     uint seed;          // in: for stochastic alpha in surface.rahit
 };
 

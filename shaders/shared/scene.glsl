@@ -30,6 +30,11 @@ const uint INSTANCE_MIRRORED = 1u;  // determinant below 0: the winding seen in 
 // Geometry.flags
 const uint GEOMETRY_MOVED = 1u;     // mesh_from_primitive is not the identity, now or in the last frame
 const uint GEOMETRY_MOVING = 2u;    // the previous vertices or matrix differ from the present ones
+const uint GEOMETRY_SHAPES = 4u;    // spheres and boxes: `positions` is the address of Shape[triangle_count], there are no attributes and no indices
+
+// Shape.kind
+const uint SHAPE_SPHERE = 0u;
+const uint SHAPE_BOX = 1u;
 
 // Light.kind
 const uint LIGHT_POINT = 0u;
@@ -53,12 +58,19 @@ struct Geometry {
     uint64_t previous_positions; // the same of the last frame; equal to `positions` unless the mesh deforms
     uint64_t attributes;        // address of VertexAttributes[], same order
     uint64_t indices;           // address of uint[], already moved to the first index of this geometry
-    uint triangle_count;
+    uint triangle_count;        // or number of shapes
     uint flags;
     uint pad0;
     uint pad1;
     vec4 mesh_from_primitive[3];
     vec4 previous_mesh_from_primitive[3];
+};
+
+// A sphere or a box, primitive space. A size of 0: rays never meet it.
+struct Shape {
+    vec3 centre;
+    uint kind;
+    vec3 half_extent;           // of a sphere: the radius, three times
 };
 
 struct VertexAttributes {
@@ -149,6 +161,7 @@ struct Scene {
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer InstanceTable { Instance at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryTable { Geometry at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PositionTable { vec3 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer ShapeTable { Shape at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer AttributeTable { VertexAttributes at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer UintTable { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaterialTable { Material at[]; };
@@ -157,7 +170,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Ali
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer EmissiveTable { EmissiveTriangle at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer SceneTable { Scene scene; };
 
-// Bit of gbuffer_id.y: the back side of the triangle was seen.
+// Bit of gbuffer_id.y: the back side of the triangle was seen, or the inside of a shape.
 const uint GBUFFER_BACK = 0x80000000u;
 
 #endif

@@ -4,25 +4,33 @@
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use image::{Rgb, RgbImage};
 
 use crate::picture::failure_folder;
 
+/// One desktop at a time: a server that starts beside another can take that one's socket away, and two editors on a slow
+/// device keep nobody's deadlines.
+static TURN: Mutex<()> = Mutex::new(());
+
 /// A running Xvfb.
 pub struct Desktop {
+    _turn: MutexGuard<'static, ()>,
     server: Child,
     display: String,
     folder: tempfile::TempDir,
 }
 
 impl Desktop {
-    /// Starts a server on a free display.
+    /// Starts a server on a free display, once no other desktop is left.
     ///
     /// # Panics
     /// When Xvfb is missing or does not start.
     pub fn start(extent: [u32; 2]) -> Self {
+        // A test that failed in its turn says nothing about the next.
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().expect("a folder");
         let screen = format!("{}x{}x24", extent[0], extent[1]);
         let mut server = Command::new("Xvfb")
@@ -35,7 +43,7 @@ impl Desktop {
         let mut number = String::new();
         let output = server.stdout.take().expect("the server's output");
         BufReader::new(output).read_line(&mut number).expect("the display's number");
-        Self { server, display: format!(":{}", number.trim()), folder }
+        Self { _turn: turn, server, display: format!(":{}", number.trim()), folder }
     }
 
     /// A command that sees this display and no other, with settings of its own.

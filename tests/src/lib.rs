@@ -5,6 +5,7 @@
 pub mod compute;
 pub mod desktop;
 pub mod gpu;
+pub mod models;
 pub mod numbers;
 pub mod picture;
 pub mod program;

@@ -145,6 +145,7 @@ pub fn mesh_of(
         colors: Vec::new(),
         geometries: vec![geometry],
         deformation: None,
+        shapes: Vec::new(),
         positions,
         normals,
         tex_coords0,

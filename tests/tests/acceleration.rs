@@ -1,6 +1,5 @@
 //! When acceleration structures are built, refitted, rebuilt, compacted and swapped, counted row by row of the design's table;
 //! and that the picture is that of a fresh scene after each.
-#![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
 use std::sync::Arc;
 

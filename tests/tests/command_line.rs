@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use caustica_tests::models::cube;
 use caustica_tests::program::{Run, caustica};
 use caustica_tests::repository;
 use serde_json::Value;
@@ -87,6 +88,34 @@ fn the_same_command_writes_the_same_bytes() {
     let first = bytes("a.png", &[]);
     assert_eq!(first, bytes("b.png", &[]));
     assert_ne!(first, bytes("c.png", &["--seed", "5"]));
+}
+
+#[test]
+fn a_time_of_an_animation_can_be_rendered() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, animated) in [("moves.gltf", true), ("stands.gltf", false)] {
+        std::fs::write(folder.path().join(name), cube(animated)).expect("a model on disk");
+    }
+    let bytes = |at: &[&str]| {
+        let run = render(folder.path(), "moves.gltf", &[&["-o", "a.png", "--samples", "2"], at].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        std::fs::read(folder.path().join("a.png")).expect("an image")
+    };
+    let (rest, later) = (bytes(&[]), bytes(&["--at", "1"]));
+    assert!(rest == bytes(&["--at", "0"]), "the clip starts where the cube rests");
+    assert!(rest != later, "after a second it is elsewhere");
+    assert!(later == bytes(&["--at", "3"]), "the clip of two seconds has begun again");
+
+    let json = &["-o", "a.png", "--samples", "1", "--at", "0.5", "--json"];
+    let figures = json_of(&render(folder.path(), "moves.gltf", json));
+    assert_eq!((&figures["at"], &figures["device_profile"]), (&Value::from(0.5), &Value::from("default")));
+    assert!(figures["acceleration_structures"]["total_tlas_built"].as_u64().is_some_and(|n| n > 0));
+
+    let run = render(folder.path(), "stands.gltf", &["-o", "b.png", "--at", "1"]);
+    assert_eq!(run.code, Some(1), "{}", run.stderr);
+    assert!(run.stderr.contains("stands.gltf") && run.stderr.contains("--at"), "{}", run.stderr);
+    let run = render(folder.path(), "moves.gltf", &["-o", "b.png", "--at=-1"]);
+    assert_eq!(run.code, Some(2), "{}", run.stderr);
 }
 
 /// Reads an EXR written by the program: pixels and attributes as text.

@@ -233,6 +233,8 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         shadow_rays: false,
         temporal: false,
         motion: false,
+        shapes: false,
+        primary_rays: false,
     };
     let cases = [
         ("LIGHTS", Needs { lights: true, ..nothing }),
@@ -246,6 +248,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         ("EMISSION", Needs { emission: true, ..nothing }),
         ("SHADOW_RAYS", Needs { shadow_rays: true, ..nothing }),
         ("MOTION", Needs { motion: true, ..nothing }),
+        ("SHAPES", Needs { shapes: true, ..nothing }),
     ];
     let text = shader_text("shared/needs.glsl");
     let count = text.matches("constant_id").count();

@@ -1,72 +1,85 @@
 //! The editor in a window, from outside: starts under a display of its own, a click selects, a drag of the gizmo moves,
-//! undo brings back, the process stays healthy and quits from inside.
+//! undo brings back, an animation plays, the process stays healthy and quits from inside.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 
 use caustica_tests::desktop::{Desktop, wait_for};
+use caustica_tests::models::cube;
 use caustica_tests::program::program;
 use image::RgbImage;
 
 /// The window: small, for slow devices.
 const WINDOW: [u32; 2] = [1000, 700];
-
-/// A grey cube as glTF, in one file.
-fn cube_gltf() -> String {
-    let corners: Vec<[f32; 3]> =
-        (0..8).map(|i| [4, 2, 1].map(|bit| if i & bit == 0 { -0.5 } else { 0.5 })).collect();
-    let faces: [[u16; 4]; 6] =
-        [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
-    let indices = faces.iter().flat_map(|[a, b, c, d]| [*a, *b, *c, *a, *c, *d]);
-    let mut bytes: Vec<u8> = corners.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-    bytes.extend(indices.flat_map(u16::to_le_bytes));
-    let data = base64(&bytes);
-    serde_json::json!({
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "Cube"}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [-0.5, -0.5, -0.5], "max": [0.5, 0.5, 0.5]},
-            {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"},
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": 72},
-        ],
-        "buffers": [{"byteLength": 168, "uri": format!("data:application/octet-stream;base64,{data}")}],
-    })
-    .to_string()
-}
-
-/// RFC 4648 base64.
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::new();
-    for chunk in bytes.chunks(3) {
-        let word =
-            chunk.iter().enumerate().fold(0_u32, |word, (i, byte)| word | u32::from(*byte) << (16 - 8 * i));
-        for i in 0..4 {
-            let letter = LETTERS[(word >> (18 - 6 * i)) as usize & 63] as char;
-            text.push(if i <= chunk.len() { letter } else { '=' });
-        }
-    }
-    text
-}
+/// Where the cube is in it.
+const MIDDLE: [u32; 2] = [WINDOW[0] * 48 / 100, WINDOW[1] * 43 / 100];
 
 /// The editor, ended when the test ends.
 struct Editor<'a> {
     process: Child,
     desktop: &'a Desktop,
     log: PathBuf,
+    /// Number of its window.
+    window: String,
 }
 
-impl Editor<'_> {
+impl<'a> Editor<'a> {
+    /// Opens a model and waits for its picture in a window of the size that the tests count with.
+    fn open(desktop: &'a Desktop, folder: &Path, gltf: &str) -> Self {
+        let model = folder.join("cube.gltf");
+        std::fs::write(&model, gltf).expect("a model on disk");
+        let log_path = folder.join("log.txt");
+        let log = std::fs::File::create(&log_path).expect("a log");
+        let mut command = desktop.command(program());
+        command
+            .arg("--validation")
+            .arg(&model)
+            .env("CAUSTICA_LOG", "info")
+            .env("NO_COLOR", "1")
+            .current_dir(folder);
+        command.stdout(log.try_clone().expect("a log")).stderr(log).stdin(Stdio::null());
+        let process = command.spawn().expect("the editor starts");
+        let mut editor = Self { process, desktop, log: log_path, window: String::new() };
+        editor.window = editor.wait_for("the window", 60, |desktop| desktop.window("Caustica"));
+        desktop.xdotool(&format!("windowsize {} {} {}", editor.window, WINDOW[0], WINDOW[1]));
+        desktop.xdotool(&format!("windowfocus {}", editor.window));
+        editor.wait_for("a picture in the resized window", 60, |desktop| {
+            let screen = desktop.screenshot();
+            let outside = screen.get_pixel(WINDOW[0] + 50, WINDOW[1] / 2).0;
+            // The cube in the middle of the view is brighter than the panels around it.
+            let bright = screen.get_pixel(MIDDLE[0], MIDDLE[1]).0.iter().all(|c| *c > 60);
+            (bright && outside == [0, 0, 0]).then_some(())
+        });
+        editor
+    }
+
     fn log(&self) -> String {
         std::fs::read_to_string(&self.log).unwrap_or_default()
     }
 
-    fn assert_alive(&mut self) {
-        let ended = self.process.try_wait().expect("the process");
-        assert!(ended.is_none(), "the editor ended: {ended:?}");
+    /// Waits for something to be seen, as long as the editor lives.
+    fn wait_for<T>(&mut self, what: &str, seconds: u64, mut found: impl FnMut(&Desktop) -> Option<T>) -> T {
+        wait_for(what, seconds, || {
+            let ended = self.process.try_wait().expect("the process");
+            assert!(ended.is_none(), "the editor ended: {ended:?}");
+            found(self.desktop)
+        })
+    }
+
+    fn title(&self) -> String {
+        self.desktop.xdotool(&format!("getwindowname {}", self.window)).trim().to_owned()
+    }
+
+    /// Quits by its key, which asks nothing when nothing is unsaved, and looks for complaints.
+    fn quit(mut self) {
+        self.desktop.xdotool("key ctrl+q");
+        let status = wait_for("the editor to quit", 30, || self.process.try_wait().expect("the process"));
+        let log = self.log();
+        assert!(status.success(), "{status}\n{log}");
+        for word in ["validation", "panicked", "ERROR", "lost"] {
+            assert!(!log.contains(word), "the log speaks of '{word}':\n{log}");
+        }
     }
 }
 
@@ -118,45 +131,44 @@ fn changed(a: &RgbImage, b: &RgbImage) -> usize {
     a.pixels().zip(b.pixels()).filter(|(p, q)| (0..3).any(|i| p.0[i].abs_diff(q.0[i]) > 40)).count()
 }
 
+/// Mean brightness of squares of 16 pixels in the part of the view that the cube moves through: noise evens out.
+fn squares(screen: &RgbImage) -> Vec<f64> {
+    let [left, top, right, bottom] =
+        [WINDOW[0] * 30 / 100, WINDOW[1] * 22 / 100, WINDOW[0] * 68 / 100, WINDOW[1] * 58 / 100];
+    let corners = (top..bottom).step_by(16).flat_map(|y| (left..right).step_by(16).map(move |x| (x, y)));
+    let mean = |(x, y): (u32, u32)| {
+        let pixels = (0..16).flat_map(|dy| (0..16).map(move |dx| (dx, dy)));
+        let sum: f64 = pixels.map(|(dx, dy)| f64::from(screen.get_pixel(x + dx, y + dy).0[1])).sum();
+        sum / 256.0
+    };
+    corners.map(mean).collect()
+}
+
+/// The screen once the picture has come to rest.
+fn settled(editor: &mut Editor<'_>) -> RgbImage {
+    let mut last = editor.desktop.screenshot();
+    editor.wait_for("the picture to come to rest", 30, |desktop| {
+        std::thread::sleep(std::time::Duration::from_millis(700));
+        let before = std::mem::replace(&mut last, desktop.screenshot());
+        (moved_squares(&before, &last) <= 2).then_some(())
+    });
+    last
+}
+
+/// Squares that differ visibly.
+fn moved_squares(a: &RgbImage, b: &RgbImage) -> usize {
+    squares(a).iter().zip(squares(b)).filter(|(a, b)| (*a - b).abs() > 16.0).count()
+}
+
 #[test]
 fn an_object_is_selected_dragged_and_put_back() {
     let folder = tempfile::tempdir().expect("a folder");
-    let model = folder.path().join("cube.gltf");
-    std::fs::write(&model, cube_gltf()).expect("a model on disk");
-    let log_path = folder.path().join("log.txt");
-    let log = std::fs::File::create(&log_path).expect("a log");
     let desktop = Desktop::start([1600, 960]);
-    let mut command = desktop.command(program());
-    command
-        .arg("--validation")
-        .arg(&model)
-        .env("CAUSTICA_LOG", "info")
-        .env("NO_COLOR", "1")
-        .current_dir(folder.path());
-    command.stdout(log.try_clone().expect("a log")).stderr(log).stdin(Stdio::null());
-    let process = command.spawn().expect("the editor starts");
-    let mut editor = Editor { process, desktop: &desktop, log: log_path };
-
-    let window = wait_for("the window", 60, || {
-        editor.assert_alive();
-        desktop.window("Caustica")
-    });
-    desktop.xdotool(&format!("windowsize {window} {} {}", WINDOW[0], WINDOW[1]));
-    desktop.xdotool(&format!("windowfocus {window}"));
-    // The cube in the middle of the view is brighter than the panels around it.
-    let middle = [WINDOW[0] * 48 / 100, WINDOW[1] * 43 / 100];
-    wait_for("a picture in the resized window", 60, || {
-        editor.assert_alive();
-        let screen = desktop.screenshot();
-        let outside = screen.get_pixel(WINDOW[0] + 50, WINDOW[1] / 2).0;
-        let bright = screen.get_pixel(middle[0], middle[1]).0.iter().all(|c| *c > 60);
-        (bright && outside == [0, 0, 0]).then_some(())
-    });
+    let mut editor = Editor::open(&desktop, folder.path(), &cube(false));
     assert!(outline(&desktop.screenshot()).is_none(), "nothing is selected at first");
 
-    desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", middle[0], middle[1]));
-    let (handle, before) = wait_for("the outline and the gizmo of the selected cube", 30, || {
-        editor.assert_alive();
+    desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", MIDDLE[0], MIDDLE[1]));
+    let (handle, before) = editor.wait_for("the outline and the gizmo of the selected cube", 30, |desktop| {
         let screen = desktop.screenshot();
         let around = outline(&screen)?;
         Some((red_handle(&screen, around)?, around))
@@ -165,42 +177,67 @@ fn an_object_is_selected_dragged_and_put_back() {
 
     // Along the red axis, which points to the right of the picture.
     desktop.drag(handle, [100, 0]);
-    let moved = |from: Box| {
+    let after = editor.wait_for("the cube to follow the drag", 30, |desktop| {
         let now = outline(&desktop.screenshot())?;
-        (now[0] > from[0] + 30).then_some(now)
-    };
-    let after = wait_for("the cube to follow the drag", 30, || {
-        editor.assert_alive();
-        moved(before)
+        (now[0] > before[0] + 30).then_some(now)
     });
     assert!(changed(&still, &desktop.screenshot()) > 2000, "from {before:?} to {after:?}");
 
     // Away from the handle, which is highlighted as long as it is held.
     desktop.xdotool(&format!("mousemove {} {}", WINDOW[0] / 4, WINDOW[1] / 2));
-    wait_for("the drag to end", 30, || {
+    editor.wait_for("the drag to end", 30, |desktop| {
         let screen = desktop.screenshot();
         red_handle(&screen, outline(&screen)?)
     });
     desktop.xdotool("key ctrl+z");
-    wait_for("undo to put the cube back", 30, || {
-        editor.assert_alive();
+    editor.wait_for("undo to put the cube back", 30, |desktop| {
         let now = outline(&desktop.screenshot())?;
         now.iter().zip(before).all(|(a, b)| a.abs_diff(b) <= 3).then_some(())
     });
-
-    desktop.xdotool("key ctrl+q");
-    let status = wait_for("the editor to quit", 30, || editor.process.try_wait().expect("the process"));
-    let log = editor.log();
-    assert!(status.success(), "{status}\n{log}");
-    for word in ["validation", "panicked", "ERROR", "lost"] {
-        assert!(!log.contains(word), "the log speaks of '{word}':\n{log}");
-    }
+    editor.quit();
 }
 
 #[test]
-fn base64_follows_its_specification() {
-    // RFC 4648, section 10.
-    for (plain, text) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
-        assert_eq!(base64(plain.as_bytes()), text);
+fn an_animation_plays_and_leaves_the_document_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let desktop = Desktop::start([1600, 960]);
+    let mut editor = Editor::open(&desktop, folder.path(), &cube(true));
+    let title = editor.title();
+    assert!(!title.contains('\u{2022}'), "nothing is unsaved: {title}");
+    let at_rest = settled(&mut editor);
+
+    desktop.xdotool("key space");
+    editor.wait_for("the cube to leave its place", 30, |desktop| {
+        (moved_squares(&at_rest, &desktop.screenshot()) > 20).then_some(())
+    });
+    let once = desktop.screenshot();
+    editor.wait_for("the cube to move on", 30, |desktop| {
+        (moved_squares(&once, &desktop.screenshot()) > 20).then_some(())
+    });
+
+    // From the start of the clip, which is where the cube stood, so that the pause is seen in a known place.
+    desktop.xdotool("key space key alt+Home");
+    editor.wait_for("the cube at the start of its clip", 30, |desktop| {
+        (moved_squares(&at_rest, &desktop.screenshot()) <= 4).then_some(())
+    });
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let paused = moved_squares(&at_rest, &desktop.screenshot());
+    assert!(paused <= 4, "it stays there: {paused} squares differ");
+
+    // Twelve frames on are half a metre: a step is a time, and no edit.
+    for _ in 0..12 {
+        desktop.xdotool("key alt+Right sleep 0.1");
     }
+    editor.wait_for("the steps to be seen", 30, |desktop| {
+        (moved_squares(&at_rest, &desktop.screenshot()) > 20).then_some(())
+    });
+    desktop.xdotool("key ctrl+z sleep 1");
+    assert!(moved_squares(&at_rest, &desktop.screenshot()) > 20, "there was nothing to undo");
+    assert_eq!(editor.title(), title, "nothing is unsaved");
+    desktop.xdotool("key shift+space");
+    editor.wait_for("the rest pose", 30, |desktop| {
+        (moved_squares(&at_rest, &desktop.screenshot()) <= 4).then_some(())
+    });
+    assert!(!editor.log().contains("undone"), "{}", editor.log());
+    editor.quit();
 }

@@ -102,6 +102,18 @@ pub enum Action {
     ToggleSpace,
     /// Steps or not.
     ToggleSnap,
+    /// Let the animation play, or pause it.
+    PlayPause,
+    /// Show the beginning of the animation.
+    ToStart,
+    /// Show the frame before.
+    StepBack,
+    /// Show the next frame.
+    StepForward,
+    /// Begin again at the end, or stop there.
+    ToggleLoop,
+    /// Show the scene without any clip.
+    RestPose,
     /// Open the command palette.
     Palette,
     /// Open a window of the Help menu.
@@ -121,6 +133,8 @@ pub enum Menu {
     View,
     /// Settings of the picture.
     Render,
+    /// Time.
+    Animation,
     /// The tool bar.
     Tool,
     /// Help.
@@ -159,7 +173,7 @@ fn command(
 
 /// Every command with a fixed name, in the order of the menus.
 pub fn commands() -> Vec<Command> {
-    [file(), edit(), add(), view(), render(), tools(), help()].concat()
+    [file(), edit(), add(), view(), render(), animation(), tools(), help()].concat()
 }
 
 fn file() -> Vec<Command> {
@@ -246,6 +260,19 @@ fn render() -> Vec<Command> {
     commands
 }
 
+fn animation() -> Vec<Command> {
+    let time = |icon, name, action, key| command(Menu::Animation, icon, name, action, key);
+    const ALT: Modifiers = Modifiers::ALT;
+    vec![
+        time(icon::SKIP_BACK, "To the start", Action::ToStart, Some((ALT, Key::Home))),
+        time(icon::CARET_LINE_LEFT, "One frame back", Action::StepBack, Some((ALT, Key::ArrowLeft))),
+        time(icon::PLAY, "Play or pause", Action::PlayPause, Some((PLAIN, Key::Space))),
+        time(icon::CARET_LINE_RIGHT, "One frame on", Action::StepForward, Some((ALT, Key::ArrowRight))),
+        time(icon::REPEAT, "Loop", Action::ToggleLoop, None),
+        time(icon::STOP, "Rest pose", Action::RestPose, Some((Modifiers::SHIFT, Key::Space))),
+    ]
+}
+
 fn tools() -> Vec<Command> {
     let tool = |icon, name, action, key| command(Menu::Tool, icon, name, action, Some((PLAIN, key)));
     vec![
@@ -313,7 +340,9 @@ pub fn pressed(context: &egui::Context, typing: bool) -> Vec<Action> {
     }
     let commands = commands();
     let matching = |(modifiers, key): (Modifiers, Key)| {
-        if typing && belongs_to_text(modifiers, key) {
+        // Space presses the button that has the keyboard.
+        let presses = key == Key::Space && context.memory(|memory| memory.focused().is_some());
+        if typing && belongs_to_text(modifiers, key) || presses {
             return None;
         }
         let known = commands.iter().filter_map(|c| Some((c.shortcut?, &c.action)));
@@ -364,6 +393,10 @@ mod tests {
         assert_eq!(ask((ctrl, Key::Y), false), [Action::Redo]);
         assert_eq!(ask((PLAIN, Key::G), false), [Action::Tool(Tool::Move)]);
         assert_eq!(ask((PLAIN, Key::G), true), []);
+        assert_eq!(ask((PLAIN, Key::Space), false), [Action::PlayPause]);
+        assert_eq!(ask((PLAIN, Key::Space), true), []);
+        assert_eq!(ask((Modifiers::SHIFT, Key::Space), false), [Action::RestPose]);
+        assert_eq!(ask((Modifiers::ALT, Key::ArrowRight), true), []);
         assert_eq!(ask((ctrl, Key::Z), true), []);
         assert_eq!(ask((ctrl, Key::S), true), [Action::Save]);
     }

@@ -13,6 +13,7 @@ use crate::camera_control::{AxisView, Pose, framing_projection};
 use crate::dialogs::Wish;
 use crate::gizmo::Space;
 use crate::panels::{Cx, outliner, view_input};
+use crate::playback;
 use crate::session::ViewCamera;
 use crate::ui_state::PaletteState;
 
@@ -51,6 +52,12 @@ impl Editor {
             Action::CameraFromView => self.camera_from_view(),
             Action::ToggleProjection => self.toggle_projection(),
             Action::Environment => self.ask(Wish::Environment),
+            Action::PlayPause
+            | Action::ToStart
+            | Action::StepBack
+            | Action::StepForward
+            | Action::ToggleLoop
+            | Action::RestPose => self.animate(&action),
             other => self.perform_setting(other),
         }
     }
@@ -80,6 +87,38 @@ impl Editor {
             }
             other => tracing::debug!("{other:?} is carried out elsewhere"),
         }
+    }
+
+    /// Actions on the time that is shown.
+    fn animate(&mut self, action: &Action) {
+        let Some(duration_s) = self.session.duration() else {
+            self.state.toasts.info("Nothing here is animated, or no clip is chosen (Animation panel).");
+            return;
+        };
+        let playback = &mut self.state.playback;
+        let now_s = self.session.time().unwrap_or(0.0);
+        let time_s = match action {
+            Action::ToggleLoop => {
+                playback.looping = !playback.looping;
+                return;
+            }
+            Action::PlayPause if playback.playing => {
+                playback.playing = false;
+                return;
+            }
+            Action::PlayPause => Some(playback.start(now_s, duration_s)),
+            Action::ToStart => Some(0.0),
+            Action::StepBack | Action::StepForward => {
+                playback.playing = false;
+                let frames = if *action == Action::StepBack { -1.0 } else { 1.0 };
+                Some(playback::step(now_s, duration_s, frames))
+            }
+            _ => {
+                playback.playing = false;
+                None
+            }
+        };
+        self.session.set_time(time_s);
     }
 
     fn cx(&mut self) -> Cx<'_> {

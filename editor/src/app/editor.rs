@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use caustica_scene::{Finding, audit};
 use egui::{CentralPanel, Context, Frame, Id, Margin, Modal, Panel, Ui, WidgetText};
@@ -52,6 +53,8 @@ pub struct Editor {
     pub(super) quit: bool,
     pub(super) wake: Wake,
     theme_set: Option<bool>,
+    /// When the animation last went on; `None` while it does not play.
+    played: Option<Instant>,
 }
 
 impl Editor {
@@ -73,6 +76,7 @@ impl Editor {
             quit: false,
             wake,
             theme_set: None,
+            played: None,
         }
     }
 
@@ -122,6 +126,7 @@ impl Editor {
         let context = ui.ctx().clone();
         self.apply_theme(&context);
         self.poll_loading();
+        self.play(Instant::now());
         self.keep_audited();
         self.take_keys(&context);
         self.take_dropped_files(&context);
@@ -136,6 +141,20 @@ impl Editor {
         }
         self.state.selection.retain_in(self.session.document());
         self.session.set_selection(self.state.selection.targets());
+    }
+
+    /// Moves the time on while the animation plays. Neither history nor file know of it.
+    fn play(&mut self, now: Instant) {
+        let playback = &mut self.state.playback;
+        let duration_s = self.session.duration();
+        playback.playing &= duration_s.is_some();
+        let Some(duration_s) = duration_s.filter(|_| playback.playing) else {
+            self.played = None;
+            return;
+        };
+        let dt_s = self.played.replace(now).map_or(0.0, |before| (now - before).as_secs_f64());
+        let time_s = playback.advance(self.session.time().unwrap_or(0.0), duration_s, dt_s);
+        self.session.set_time(Some(time_s));
     }
 
     fn apply_theme(&mut self, context: &Context) {
@@ -349,6 +368,8 @@ impl TabViewer for Tabs<'_> {
             Tab::Inspector => panels::inspector::ui(&mut self.cx, ui),
             Tab::Render => panels::render::ui(&mut self.cx, ui),
             Tab::Passes => panels::reports::passes(&mut self.cx, ui),
+            Tab::Acceleration => panels::acceleration::ui(&mut self.cx, ui),
+            Tab::Animation => panels::timeline::ui(&mut self.cx, ui),
             Tab::LeftOut => panels::reports::left_out(&mut self.cx, ui),
             Tab::Health => panels::reports::health(&mut self.cx, ui),
             Tab::Log => panels::reports::log(&mut self.cx, ui),

@@ -165,12 +165,13 @@ impl Editor {
         }
     }
 
-    /// Another document is shown: selection, open rows and distances of the old one mean nothing any more.
+    /// Another document is shown, at rest: selection, open rows and distances of the old one mean nothing any more.
     pub(super) fn new_scene_shown(&mut self) {
         self.state.selection.clear();
         self.state.outliner.reset();
         self.state.health = None;
         self.state.view.drag = None;
+        self.state.playback.playing = false;
         let roots: Vec<_> = self.session.document().roots().to_vec();
         if let [only] = roots.as_slice() {
             self.state.outliner.set_open((*only).into(), true);

@@ -1,5 +1,7 @@
 //! One window: events in, frames out. Enters: winit's events. Leaves: pictures on the screen. A frame is drawn only
-//! when there is a reason: input, an unfinished picture, an animation of the user interface.
+//! when there is a reason: input, an unfinished picture, an animation. How one is made is in `window/frames.rs`.
+
+mod frames;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,12 +9,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use caustica_renderer::ViewSettings;
-use caustica_renderer::gpu::{
-    Access, Device, DeviceOptions, GpuError, Instance, InstanceOptions, Recorder, Requirements, Stage,
-    Swapchain, Use,
-};
+use caustica_renderer::gpu::{Device, DeviceOptions, Instance, InstanceOptions, Requirements, Swapchain};
 use egui::ViewportId;
-use egui::epaint::ClippedPrimitive;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::dpi::LogicalSize;
 use winit::event::WindowEvent;
@@ -30,13 +28,6 @@ use crate::ui_renderer::UiRenderer;
 use crate::ui_state::Config;
 use crate::worker::Wake;
 
-/// A device that takes longer than this from one submit to the next repaints the panels alone while there is input.
-const SLOW_MS: f64 = 80.0;
-/// Longest time without a new picture while there is input.
-const PICTURE_AT_LEAST_EVERY: Duration = Duration::from_millis(250);
-
-/// Label of the pass that draws the panels.
-const UI_PASS: &str = "ui";
 /// How often a slow device is asked whether it has finished.
 const DEVICE_POLL: Duration = Duration::from_millis(4);
 
@@ -246,231 +237,6 @@ impl EditorWindow {
         }
         Ok(Next::GoOn)
     }
-
-    fn frame(&mut self) -> anyhow::Result<()> {
-        self.silent = false;
-        if self.must_resize {
-            self.resize()?;
-        }
-        if self.swapchain.extent().contains(&0) {
-            // Minimised: the next resize brings the window back.
-            return Ok(());
-        }
-        let input = self.input.take_egui_input(&self.window);
-        let output = self.context.run_ui(input, |ui| self.editor.ui(ui));
-        self.input.handle_platform_output(&self.window, output.platform_output);
-        self.set_title();
-        let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
-        self.ui.set_textures(output.textures_delta)?;
-        let recorder = self.picture()?;
-        self.present(recorder, output.pixels_per_point, primitives)?;
-        self.had_input = false;
-        let delay =
-            output.viewport_output.get(&ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
-        self.plan_next(delay);
-        Ok(())
-    }
-
-    fn resize(&mut self) -> anyhow::Result<()> {
-        let size = self.window.inner_size();
-        self.must_resize = false;
-        match self.swapchain.resize([size.width, size.height]) {
-            Ok(()) => Ok(()),
-            Err(GpuError::SurfaceOutOfDate) => {
-                self.must_resize = true;
-                Ok(())
-            }
-            Err(error) => Err(error).context("resizing the window"),
-        }
-    }
-
-    fn set_title(&mut self) {
-        let title = self.editor.title();
-        if title != self.title {
-            self.window.set_title(&title);
-            self.title = title;
-        }
-    }
-
-    /// Renders the view where that is due; else only opens a frame for the panels.
-    fn picture(&mut self) -> anyhow::Result<Recorder> {
-        let (recorder, is_picture) = self.picture_or_panels()?;
-        self.continuous = is_picture;
-        Ok(recorder)
-    }
-
-    /// True: the recorder holds a picture.
-    fn picture_or_panels(&mut self) -> anyhow::Result<(Recorder, bool)> {
-        let Some(full) = self.editor.state.view.extent_px else {
-            return self.panels_alone();
-        };
-        let key = self.key(full);
-        let fresh = self.shown.as_ref() == Some(&key);
-        let moving =
-            self.shown.as_ref().is_some_and(|shown| shown.camera != key.camera || shown.state != key.state)
-                || self.editor.state.view.drag.is_some()
-                || self.editor.state.view.flying;
-        let waits =
-            fresh && self.had_input && self.is_slow() && self.last_picture.elapsed() < PICTURE_AT_LEAST_EVERY;
-        let done = fresh && self.editor.session.is_converged();
-        if waits || done || self.broken.as_ref() == Some(&key) {
-            return self.panels_alone();
-        }
-        let config = &self.editor.state.config;
-        let target_ms = config.adaptive.then_some(f64::from(config.target_frame_ms));
-        let divisor = self.adaptive.next(Instant::now(), moving, full, target_ms);
-        self.editor.state.view.divisor = divisor;
-        match self.editor.session.begin_frame(full.map(|side| side.div_ceil(divisor).max(1))) {
-            Ok(recorder) => {
-                self.broken = None;
-                self.shown = Some(key);
-                self.note_times();
-                Ok((recorder, true))
-            }
-            Err(error) if is_fatal(&error) => Err(error),
-            Err(error) => {
-                self.editor.state.toasts.error(format!("The picture cannot be rendered: {error:#}."));
-                self.broken = Some(key);
-                self.panels_alone()
-            }
-        }
-    }
-
-    fn panels_alone(&mut self) -> anyhow::Result<(Recorder, bool)> {
-        Ok((self.editor.session.begin_ui_frame()?, false))
-    }
-
-    fn key(&self, extent: [u32; 2]) -> PictureKey {
-        let session = &self.editor.session;
-        let (camera, settings) = (*session.camera(), session.settings().clone());
-        PictureKey { camera, settings, state: session.picture_revision(), extent }
-    }
-
-    fn note_times(&mut self) {
-        let now = Instant::now();
-        if self.continuous {
-            let interval_ms = now.duration_since(self.last_picture).as_secs_f64() * 1e3;
-            self.interval_ms += (interval_ms - self.interval_ms) * 0.3;
-        }
-        self.last_picture = now;
-        let passes = self.editor.session.statistics().passes.iter();
-        let ms: f64 = passes.filter(|(label, _)| label != UI_PASS).map(|(_, ms)| ms).sum();
-        self.adaptive.measured(ms);
-    }
-
-    fn is_slow(&self) -> bool {
-        self.interval_ms > SLOW_MS
-    }
-
-    /// Draws the panels over the picture and shows them.
-    fn present(
-        &mut self,
-        mut recorder: Recorder,
-        points: f32,
-        primitives: Vec<ClippedPrimitive>,
-    ) -> anyhow::Result<()> {
-        if let Some(image) = self.editor.session.window_image() {
-            self.ui.set_view(image)?;
-            recorder.declare(&[Use::Image(image, Stage::Raster, Access::Sampled)]);
-        }
-        let acquired = match self.swapchain.acquire() {
-            Ok(acquired) => acquired,
-            Err(GpuError::SurfaceOutOfDate) => {
-                self.must_resize = true;
-                None
-            }
-            Err(error) => return Err(error).context("asking for the window's image"),
-        };
-        let Some(acquired) = acquired else {
-            self.editor.session.submit(recorder, None)?;
-            self.window.request_redraw();
-            return Ok(());
-        };
-        let clear =
-            theme::window_color(self.editor.state.config.dark).to_array().map(|c| f32::from(c) / 255.0);
-        let extent = self.swapchain.extent();
-        let (swapchain, ui) = (&self.swapchain, &mut self.ui);
-        let mut drawn = Ok(());
-        recorder.pass(UI_PASS, |recorder| {
-            swapchain.begin_rendering(recorder, &acquired, clear);
-            drawn = ui.draw(recorder, extent, points, primitives);
-            swapchain.end_rendering(recorder, &acquired);
-            Ok::<(), GpuError>(())
-        })?;
-        self.editor.session.submit(recorder, Some(&acquired))?;
-        drawn?;
-        self.window.pre_present_notify();
-        match self.swapchain.present(acquired) {
-            Ok(()) => Ok(()),
-            Err(GpuError::SurfaceOutOfDate) => {
-                self.must_resize = true;
-                self.window.request_redraw();
-                Ok(())
-            }
-            Err(error) => Err(error).context("showing the window's image"),
-        }
-    }
-
-    /// Goes on with a picture that takes several submits, without drawing the panels: nothing they show has changed.
-    fn silent_frame(&mut self) -> anyhow::Result<()> {
-        let Some(full) = self.editor.state.view.extent_px else {
-            self.request_redraw();
-            return Ok(());
-        };
-        match self.editor.session.begin_frame(full) {
-            Ok(recorder) => self.editor.session.submit(recorder, None)?,
-            Err(error) if is_fatal(&error) => return Err(error),
-            Err(error) => {
-                // The next whole frame meets the same error and shows it.
-                tracing::debug!("{error:#}");
-                self.request_redraw();
-                return Ok(());
-            }
-        }
-        self.note_times();
-        if self.editor.session.samples() == self.samples {
-            self.go_on_soon();
-        } else {
-            self.request_redraw();
-        }
-        Ok(())
-    }
-
-    fn plan_next(&mut self, repaint_delay: Duration) {
-        let full = self.editor.state.view.extent_px;
-        let fresh = full.is_some_and(|full| self.shown.as_ref() == Some(&self.key(full)));
-        let whole = self.editor.state.view.divisor == 1;
-        let unfinished = full.is_some_and(|full| {
-            self.broken.as_ref() != Some(&self.key(full))
-                && !(fresh && whole && self.editor.session.is_converged())
-        });
-        let samples = self.editor.session.samples();
-        let nothing_new = samples == self.samples;
-        self.samples = samples;
-        self.panels_due = Instant::now().checked_add(repaint_delay);
-        let goes_on = unfinished && !self.occluded;
-        self.continuous &= goes_on;
-        if goes_on && !repaint_delay.is_zero() {
-            self.silent = fresh && whole && nothing_new;
-            self.go_on_soon();
-        } else if goes_on || repaint_delay.is_zero() || !nothing_new {
-            // The panels were drawn before the last sample was counted: once more.
-            self.request_redraw();
-        } else {
-            self.redraw_at = self.panels_due;
-        }
-    }
-
-    /// The next picture: at once, or when a slow device has finished this one.
-    fn go_on_soon(&mut self) {
-        if self.is_slow() {
-            // Never two slow pictures in a row on the queue: panels that react to input would wait for both.
-            self.waits_for_device = true;
-            self.redraw_at = Instant::now().checked_add(DEVICE_POLL);
-        } else {
-            self.carry_on();
-        }
-    }
 }
 
 impl Drop for EditorWindow {
@@ -479,17 +245,4 @@ impl Drop for EditorWindow {
             tracing::error!("waiting for the device at the end failed: {error}");
         }
     }
-}
-
-/// Whether the device is gone, so that nothing can be drawn any more.
-fn is_fatal(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        matches!(
-            cause.downcast_ref::<GpuError>(),
-            Some(GpuError::DeviceLost { .. } | GpuError::Timeout { .. })
-        )
-    }) || matches!(
-        error.downcast_ref::<caustica_renderer::RendererError>(),
-        Some(caustica_renderer::RendererError::Gpu(GpuError::DeviceLost { .. } | GpuError::Timeout { .. }))
-    )
 }

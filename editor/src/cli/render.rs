@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use caustica_renderer::{NeedsMode, Pipeline, Show, Statistics, ToneMap, ViewSettings};
+use caustica_renderer::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
 use caustica_scene::Edit;
 use clap::{ArgGroup, Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -45,6 +45,9 @@ pub(super) struct RenderArgs {
     /// Stop at this noise: sqrt(relMSE) estimated from two independent streams, 0.01 is 1 %
     #[arg(long, value_name = "X", value_parser = parse_positive)]
     target_error: Option<f64>,
+    /// Show the scene at this time of its animation; past the end of a clip it begins again. Without it: at rest
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    at: Option<f64>,
     /// Name of the camera
     #[arg(long)]
     camera: Option<String>,
@@ -124,6 +127,13 @@ fn parse_finite(text: &str) -> Result<f32, String> {
     }
 }
 
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
+        _ => Err(String::from("expected a number of seconds, 0 or more")),
+    }
+}
+
 fn parse_output(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     output::kind_of(&path).map(|_| path).map_err(|error| error.to_string())
@@ -157,7 +167,10 @@ pub(super) fn run(
     let device = device.open()?;
     let mut session =
         Session::new(&device, SessionOptions { shaders, extent: args.size, ..SessionOptions::default() })?;
-    session.open(&args.file, loaded)?;
+    session.open_at(&args.file, loaded, args.at)?;
+    if args.at.is_some() && session.duration().is_none() {
+        bail!("{}: --at was given, but no clip of it is played: nothing is animated", args.file.display());
+    }
     if let Some(environment) = environment {
         session.push(Edit::SetEnvironment(environment))?;
     }
@@ -193,7 +206,7 @@ pub(super) fn run(
     }
     report_validation(&device)?;
     if args.json {
-        say!("{}", summary(args, session.statistics(), &metadata, &run, noise, loaded_in));
+        say!("{}", summary(args, &session, &metadata, &run, noise, loaded_in));
     } else {
         say!(
             "{}: {}x{}, {} samples in {:.2} s ({}), noise {}, {}",
@@ -309,12 +322,14 @@ fn noise_of(image: &caustica_renderer::Accumulated, samples: u64) -> Option<f64>
 
 fn summary(
     args: &RenderArgs,
-    statistics: &Statistics,
+    session: &Session,
     metadata: &Metadata,
     run: &Run,
     noise: Option<f64>,
     loaded_in: Duration,
 ) -> serde_json::Value {
+    let statistics = session.statistics();
+    let profile = session.device_profile().file.as_ref();
     let passes: serde_json::Map<String, serde_json::Value> =
         medians(&run.frames).into_iter().map(|(label, ms)| (label, json!(ms))).collect();
     let memory: serde_json::Map<String, serde_json::Value> =
@@ -324,6 +339,8 @@ fn summary(
         "size": args.size,
         "pipeline": metadata.pipeline,
         "device": metadata.device,
+        "device_profile": profile.map_or_else(|| String::from("default"), |file| file.display().to_string()),
+        "at": args.at,
         "version": env!("CARGO_PKG_VERSION"),
         "samples": metadata.samples,
         "sample_offset": metadata.sample_offset,

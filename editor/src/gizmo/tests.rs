@@ -153,7 +153,7 @@ fn start_below_a_turned_parent() -> Start {
         rotation: DQuat::from_rotation_x(0.4),
         scale: DVec3::new(1.0, 2.0, 3.0),
     };
-    Start { local: Local::Trs(trs), world_from_parent: parent }
+    Start { local: Local::Trs(trs), world_from_parent: parent, middle: DVec3::ZERO }
 }
 
 #[test]
@@ -190,6 +190,16 @@ fn a_child_of_a_mirrored_parent_turns_the_right_way() {
     let before = start.world_from_parent * start.local.to_affine();
     let after = start.world_from_parent * moved.to_affine();
     assert!(after.abs_diff_eq(DAffine3::from_axis_angle(axis, 0.5) * before, 1e-9));
+}
+
+#[test]
+fn what_is_scaled_keeps_its_middle_where_it_was() {
+    let middle = DVec3::new(2.0, 0.5, -1.0);
+    let start = Start { middle, ..start_below_a_turned_parent() };
+    let scaled = start.moved(Motion::Scale(DVec3::new(2.0, 1.0, 0.5)), DVec3::ZERO).unwrap();
+    let place = |local: Local| local.to_affine().transform_point3(middle);
+    assert!((place(scaled) - place(start.local)).length() < 1e-12);
+    assert_eq!(scaled.nearest_trs().scale, DVec3::new(2.0, 2.0, 1.5));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use caustica_scene::PrefabId;
 use egui::{Button, MenuBar, RichText, Ui};
 use egui_phosphor::regular as icon;
 
-use super::{Cx, render};
+use super::{Cx, acceleration, render};
 use crate::app::actions::{Action, Command, Menu, commands};
 use crate::gizmo::Space;
 use crate::ui_state::Tab;
@@ -149,6 +149,10 @@ fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui, commands: &[Command], shown_tabs: &[T
         }
         entry(cx, ui, command, true);
     }
+    ui.menu_button(format!("{}  Animation", icon::FILM_STRIP), |ui| {
+        let animated = cx.session.duration().is_some();
+        of(commands, Menu::Animation).for_each(|command| entry(cx, ui, command, animated));
+    });
     ui.menu_button(format!("{}  Panels", icon::SQUARES_FOUR), |ui| {
         for tab in Tab::ALL {
             let mark = if shown_tabs.contains(&tab) { icon::CHECK } else { icon::DOT_OUTLINE };
@@ -270,15 +274,19 @@ pub fn status(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.separator();
         let accel = &statistics.acceleration;
         let text = format!(
-            "BLAS {} ({} built, {} refit)  TLAS {}",
+            "BLAS {} ({} built, {} refit, {} pending) \u{b7} TLAS {}",
             accel.blas_count,
             accel.blas_built,
             accel.blas_refit,
+            accel.blas_pending,
             tlas_word(accel.tlas)
         );
-        ui.label(mono(text)).on_hover_text(
-            "Acceleration structures: one BLAS a mesh, one TLAS over all instances; in brackets what the last frame did",
-        );
+        let tip = "Acceleration structures: a BLAS for each mesh and each object that deforms, one TLAS over all \
+                   instances; in brackets what the last frame did. Click for all figures";
+        if ui.add(egui::Label::new(mono(text)).sense(egui::Sense::click())).on_hover_text(tip).clicked() {
+            cx.state.actions.push(Action::ShowTab(Tab::Acceleration));
+        }
+        acceleration::pending(cx, ui);
         ui.separator();
         memory(cx, ui);
         if statistics.non_finite > 0 {

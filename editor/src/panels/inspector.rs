@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::{Cx, field, light_icon, section, target_icon};
 use crate::gizmo::paint::axis_color;
+use crate::ui_state::EulerFields;
 
 /// Draws the panel.
 pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -28,6 +29,7 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         section(ui, "Camera", |ui| camera_ui(cx, ui, target, camera));
     }
     if cx.session.document().mesh_of(target).is_some() {
+        super::mesh::ui(cx, ui, target);
         super::material::ui(cx, ui, target);
     }
     source(cx, ui, target);
@@ -75,29 +77,9 @@ fn name_field(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
 
 fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     let Some(local) = cx.session.document().local(target) else { return };
-    let trs = local.nearest_trs();
-    let mut push = |trs: Trs| cx.session.push(Edit::SetTransform { target, local: Local::Trs(trs) });
-    let mut result = Ok(());
-
-    let speed = (trs.translation.abs().max_element() * 0.002).clamp(0.002, 1.0);
-    let moved =
-        vector_field(ui, "Position", "Metres against the parent", trs.translation, speed, " m", DVec3::ZERO);
-    if let Some(translation) = moved {
-        result = push(Trs { translation, ..trs });
-    }
-    let shown = cx.state.inspector.euler.degrees(target, trs.rotation);
-    let tip = "Degrees about X, then Y, then Z (fixed axes of the parent)";
-    if let Some(degrees) = vector_field(ui, "Rotation", tip, shown, 0.5, "\u{b0}", DVec3::ZERO) {
-        let rotation = cx.state.inspector.euler.set(target, degrees);
-        result = push(Trs { rotation, ..trs });
-    }
-    let tip = "Along the object's own axes; negative mirrors";
-    if let Some(mut scale) = vector_field(ui, "Scale", tip, trs.scale, 0.01, "", DVec3::ONE) {
-        if cx.state.inspector.uniform_scale {
-            scale = uniform(trs.scale, scale);
-        }
-        result = push(Trs { scale, ..trs });
-    }
+    let inspector = &mut cx.state.inspector;
+    let (euler, uniform) = (&mut inspector.euler, inspector.uniform_scale);
+    let changed = trs_fields(ui, "parent", euler, target, local.nearest_trs(), uniform);
     ui.checkbox(&mut cx.state.inspector.uniform_scale, "Scale all axes together");
     if matches!(local, Local::Matrix(_)) {
         ui.colored_label(
@@ -105,9 +87,43 @@ fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
             "This transform has shear; changing a field removes it.",
         );
     }
-    if let Err(error) = result {
-        cx.state.toasts.error(format!("That cannot be done: {error}."));
+    if cx.session.document().posed_local(target) != Some(local) {
+        ui.colored_label(
+            ui.visuals().warn_fg_color,
+            "A clip moves this at the time that is shown; the fields are those of the rest pose.",
+        );
     }
+    if let Some(trs) = changed {
+        cx.push(Edit::SetTransform { target, local: Local::Trs(trs) });
+    }
+}
+
+/// Position, rotation and scale against `parent`; gives them when one was changed.
+pub(super) fn trs_fields(
+    ui: &mut Ui,
+    parent: &str,
+    euler: &mut EulerFields,
+    target: Target,
+    trs: Trs,
+    uniform_scale: bool,
+) -> Option<Trs> {
+    let mut changed = None;
+    let speed = (trs.translation.abs().max_element() * 0.002).clamp(0.002, 1.0);
+    let tip = format!("Metres against the {parent}");
+    let moved = vector_field(ui, "Position", &tip, trs.translation, speed, " m", DVec3::ZERO);
+    if let Some(translation) = moved {
+        changed = Some(Trs { translation, ..trs });
+    }
+    let shown = euler.degrees(target, trs.rotation);
+    let tip = format!("Degrees about X, then Y, then Z (fixed axes of the {parent})");
+    if let Some(degrees) = vector_field(ui, "Rotation", &tip, shown, 0.5, "\u{b0}", DVec3::ZERO) {
+        changed = Some(Trs { rotation: euler.set(target, degrees), ..trs });
+    }
+    let tip = "Along its own axes; negative mirrors";
+    if let Some(scale) = vector_field(ui, "Scale", tip, trs.scale, 0.01, "", DVec3::ONE) {
+        changed = Some(Trs { scale: if uniform_scale { uniform(trs.scale, scale) } else { scale }, ..trs });
+    }
+    changed
 }
 
 /// Scales all axes by the factor by which one was changed.

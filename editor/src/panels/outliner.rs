@@ -309,7 +309,8 @@ fn arrow_keys(cx: &mut Cx<'_>, ui: &Ui) {
     let Some(active) = cx.state.selection.active() else { return };
     let rows = cx.state.outliner.rows();
     let Some(index) = rows.iter().position(|row| row.target == active) else { return };
-    let pressed = |key| ui.input(|input| input.key_pressed(key));
+    // With Alt they step through time.
+    let pressed = |key| ui.input(|input| input.key_pressed(key) && input.modifiers.is_none());
     let step = match (pressed(Key::ArrowDown), pressed(Key::ArrowUp)) {
         (true, _) => index.saturating_add(1),
         (_, true) => index.saturating_sub(1),

@@ -14,6 +14,9 @@ use crate::session::Session;
 use crate::ui_state::{HelpWindow, ToastKind, UiState};
 use crate::worker::Progress;
 
+/// Height of the list of commands, points.
+const LIST_POINTS: f32 = 360.0;
+
 /// Sentences in the lower right corner of the view.
 pub fn toasts(state: &mut UiState, context: &Context) {
     let now = Instant::now();
@@ -119,7 +122,9 @@ pub fn palette(state: &mut UiState, context: &Context) {
                 palette.chosen = 0;
             }
             ui.add_space(4.0);
-            ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
+            // Without the minimum a list that was short once would stay so: the area remembers its size.
+            let list = ScrollArea::vertical().max_height(LIST_POINTS).min_scrolled_height(LIST_POINTS);
+            list.show(ui, |ui| {
                 for (index, hit) in hits.iter().enumerate() {
                     let chosen = index == palette.chosen;
                     let response = ui.add(row(ui, hit, chosen));
@@ -165,6 +170,7 @@ fn menu_name(menu: Menu) -> &'static str {
         Menu::Add => "Add",
         Menu::View => "View",
         Menu::Render => "Render",
+        Menu::Animation => "Animation",
         Menu::Tool => "Tool",
         Menu::Help => "Help",
     }
@@ -206,8 +212,9 @@ pub fn help(state: &mut UiState, session: &Session, context: &Context) {
     }
 }
 
-const MOUSE: [(&str, &str); 11] = [
+const MOUSE: [(&str, &str); 12] = [
     ("Click", "select; with Ctrl or Shift add or take away"),
+    ("Double click", "select one primitive of the mesh"),
     ("Drag a handle", "move, rotate or scale; Ctrl in steps, Esc cancels"),
     ("Middle drag, Alt + drag", "orbit"),
     ("Shift + middle drag", "pan"),

@@ -42,6 +42,7 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         None => view_input::click(cx, ui, &response, mark),
     }
     figures(cx, ui, rect);
+    primitive_note(cx, ui, rect);
     response.context_menu(|ui| context_menu(cx, ui));
 }
 
@@ -68,7 +69,7 @@ pub fn projection(cx: &Cx<'_>) -> ViewProjection {
     ViewProjection::new(camera.world_from_camera, camera.projection, DVec2::new(size.x.into(), size.y.into()))
 }
 
-/// Where the gizmo stands: in the middle of what is selected.
+/// Where the gizmo stands: in the middle of what is selected, objects or a primitive.
 fn gizmo_frame(cx: &Cx<'_>, view: &ViewProjection) -> Option<Frame> {
     if let Some(drag) = &cx.state.view.drag {
         let start = drag.drag.frame();
@@ -79,15 +80,22 @@ fn gizmo_frame(cx: &Cx<'_>, view: &ViewProjection) -> Option<Frame> {
         return Some(Frame::new(start.origin + moved, start.axes, view));
     }
     let document = cx.session.document();
-    let tops = cx.state.selection.tops(document);
-    let places: Vec<DVec3> = tops
-        .iter()
-        .filter_map(|target| document.world_from(*target))
-        .map(|world| world.translation)
-        .collect();
+    let primitive = cx.state.selection.primitive(document);
+    let world_from_primitive = primitive.and_then(|primitive| {
+        let world = document.world_from_mesh(primitive.target)? * primitive.mesh_from_primitive;
+        Some((world, world.transform_point3(primitive.middle)))
+    });
+    let places: Vec<DVec3> = match world_from_primitive {
+        Some((_, middle)) => vec![middle],
+        None => {
+            let tops = cx.state.selection.tops(document);
+            tops.iter().filter_map(|target| Some(document.world_from(*target)?.translation)).collect()
+        }
+    };
     let origin = places.iter().sum::<DVec3>() / places.len().max(1) as f64;
     let local = cx.state.space == Space::Local || cx.state.tool == Tool::Scale;
-    let axes = match cx.state.selection.active().and_then(|active| document.world_from(active)) {
+    let active = || cx.state.selection.active().and_then(|active| document.world_from(active));
+    let axes = match world_from_primitive.map(|(world, _)| world).or_else(active) {
         Some(world) if local => {
             let m = world.matrix3;
             [
@@ -244,6 +252,15 @@ fn figures(cx: &Cx<'_>, ui: &Ui, rect: Rect) {
         let text = format!("fly: W A S D Q E, Shift faster | {:.2} m/s (wheel)", view.fly_speed_m_s);
         caption(&painter, rect.center_bottom() + vec2(0.0, -10.0), Align2::CENTER_BOTTOM, &text);
     }
+}
+
+/// Says what the gizmo moves when that is no object.
+fn primitive_note(cx: &Cx<'_>, ui: &Ui, rect: Rect) {
+    let document = cx.session.document();
+    let Some(selected) = cx.state.selection.primitive(document) else { return };
+    let text =
+        format!("{}: moves wherever the mesh is placed", super::mesh::primitive_name(document, &selected));
+    caption(&ui.painter_at(rect), rect.center_top() + vec2(0.0, 10.0), Align2::CENTER_TOP, &text);
 }
 
 fn caption(painter: &egui::Painter, at: Pos2, align: Align2, text: &str) {

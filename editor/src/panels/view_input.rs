@@ -1,7 +1,7 @@
 //! What mouse and keys do over the picture. Enters: egui's input over the view. Leaves: camera moves, gizmo drags as
 //! edits, selections.
 
-use caustica_scene::{Edit, Target};
+use caustica_scene::{Edit, Local, Target};
 use egui::{CursorIcon, Key, PointerButton, Pos2, Response, Ui};
 use glam::{DVec2, DVec3};
 
@@ -9,8 +9,8 @@ use super::Cx;
 use crate::camera_control::{Pose, near_for};
 use crate::gizmo::{self, Drag, Frame, Start, Tool};
 use crate::projection::ViewProjection;
-use crate::session::ViewCamera;
-use crate::ui_state::GizmoDrag;
+use crate::session::{Pick, ViewCamera};
+use crate::ui_state::{GizmoDrag, Moved};
 
 const ORBIT_RAD_PER_POINT: f64 = 0.006;
 const LOOK_RAD_PER_POINT: f64 = 0.0035;
@@ -143,11 +143,26 @@ fn local(pointer: Pos2, origin: Pos2) -> DVec2 {
     DVec2::new((pointer.x - origin.x).into(), (pointer.y - origin.y).into())
 }
 
-fn starts(cx: &Cx<'_>) -> Vec<(Target, Start)> {
+/// What a drag moves: the selected primitive, else the selected objects.
+fn starts(cx: &Cx<'_>) -> Vec<(Moved, Start)> {
     let document = cx.session.document();
+    if let Some(primitive) = cx.state.selection.primitive(document) {
+        let start = |world_from_mesh| Start {
+            local: Local::from_affine(primitive.mesh_from_primitive),
+            world_from_parent: world_from_mesh,
+            middle: primitive.middle,
+        };
+        let moved = Moved::Primitive(primitive.mesh, primitive.index);
+        return document
+            .world_from_mesh(primitive.target)
+            .map(start)
+            .map(|s| (moved, s))
+            .into_iter()
+            .collect();
+    }
     let start = |target: Target| {
         let (local, world_from_parent) = (document.local(target)?, document.world_from_parent(target)?);
-        Some((target, Start { local, world_from_parent }))
+        Some((Moved::Object(target), Start { local, world_from_parent, middle: DVec3::ZERO }))
     };
     cx.state.selection.tops(document).into_iter().filter_map(start).collect()
 }
@@ -177,9 +192,14 @@ fn carry_on(cx: &mut Cx<'_>, ui: &Ui, response: &Response, view: &ViewProjection
     let edits: Vec<Edit> = drag
         .starts
         .iter()
-        .filter_map(|(target, start)| {
+        .filter_map(|(moved, start)| {
             let local = start.moved(motion, pivot)?;
-            Some(Edit::SetTransform { target: *target, local })
+            Some(match *moved {
+                Moved::Object(target) => Edit::SetTransform { target, local },
+                Moved::Primitive(mesh, primitive) => {
+                    Edit::SetPrimitiveTransform { mesh, primitive, mesh_from_primitive: local.to_affine() }
+                }
+            })
         })
         .collect();
     let count = edits.len();
@@ -194,39 +214,44 @@ fn carry_on(cx: &mut Cx<'_>, ui: &Ui, response: &Response, view: &ViewProjection
     }
 }
 
-/// A click selects what is under the pointer; with Ctrl or Shift it is added or taken away.
+/// A click selects the object under the pointer, with Ctrl or Shift it is added or taken away; a double click selects
+/// the primitive.
 pub fn click(cx: &mut Cx<'_>, ui: &Ui, response: &Response, mark: Option<Target>) {
     let modifiers = ui.input(|input| input.modifiers);
     if !response.clicked() || modifiers.alt || cx.state.view.hovered.is_some() {
         return;
     }
     let Some(pointer) = response.interact_pointer_pos() else { return };
-    let target = match mark {
-        Some(target) => Some(target),
+    let (target, primitive) = match mark {
+        Some(target) => (Some(target), None),
         None => match pick(cx, ui, pointer) {
-            Ok(target) => target,
+            Ok(hit) => (hit.map(|hit| hit.target), hit.map(|hit| hit.primitive)),
             Err(error) => {
                 cx.state.toasts.error(format!("The object under the pointer cannot be found: {error:#}."));
                 return;
             }
         },
     };
+    let further = modifiers.command || modifiers.shift;
     match target {
-        Some(target) if modifiers.command || modifiers.shift => cx.state.selection.toggle(target),
+        Some(target) if further => cx.state.selection.toggle(target),
         Some(target) => cx.state.selection.set(target),
-        None if !modifiers.command && !modifiers.shift => cx.state.selection.clear(),
+        None if !further => cx.state.selection.clear(),
         None => {}
+    }
+    if response.double_clicked() && !further {
+        cx.state.selection.set_primitive(cx.session.document(), primitive);
     }
     if let Some(target) = target {
         cx.state.outliner.reveal(cx.session.document(), target);
     }
 }
 
-fn pick(cx: &mut Cx<'_>, ui: &Ui, pointer: Pos2) -> anyhow::Result<Option<Target>> {
+fn pick(cx: &mut Cx<'_>, ui: &Ui, pointer: Pos2) -> anyhow::Result<Option<Pick>> {
     let Some([width, height]) = cx.state.view.extent_px else { return Ok(None) };
     let scale = ui.pixels_per_point() / cx.state.view.divisor.max(1) as f32;
     let at = (pointer - cx.state.view.rect.min) * scale;
     let limit = |size: u32| (size / cx.state.view.divisor.max(1)).saturating_sub(1);
     let pixel = [(at.x.max(0.0) as u32).min(limit(width)), (at.y.max(0.0) as u32).min(limit(height))];
-    Ok(cx.session.pick(pixel)?.map(|pick| pick.target))
+    cx.session.pick(pixel)
 }

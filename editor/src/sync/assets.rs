@@ -102,9 +102,10 @@ impl Assets {
         users
     }
 
-    /// Who places a mesh.
-    pub(super) fn users_of(&self, mesh: MeshId) -> impl Iterator<Item = Target> {
-        self.meshes.get(&mesh).into_iter().flat_map(|known| &known.users).copied()
+    /// Who places a mesh that deforms, or did before it changed.
+    pub(super) fn users_if_deforming(&self, mesh: MeshId) -> impl Iterator<Item = Target> {
+        let known = self.meshes.get(&mesh).filter(|known| known.shape.deforms());
+        known.into_iter().flat_map(|known| &known.users).copied()
     }
 
     /// How poses of a mesh look.
@@ -134,7 +135,8 @@ impl Assets {
                 }
             }
             self.release_textures(&old);
-            delta.materials.push((delta::MaterialId(id.0), material_of(material)));
+            let is_there = |texture: TextureId| document.texture(texture).is_some();
+            delta.materials.push((delta::MaterialId(id.0), material_of(material, is_there)));
         }
         for id in textures.into_iter().filter(|id| self.textures.get(id).is_some_and(|count| *count > 0)) {
             if let Some(texture) = document.texture(id) {

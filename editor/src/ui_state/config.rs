@@ -21,8 +21,12 @@ pub enum Tab {
     Inspector,
     /// Environment and settings of the view.
     Render,
+    /// Time, and the clips that are played.
+    Animation,
     /// Milliseconds of each pass.
     Passes,
+    /// What is built, refitted and left alone.
+    Acceleration,
     /// What this scene does not need.
     LeftOut,
     /// Findings of the audit.
@@ -33,12 +37,14 @@ pub enum Tab {
 
 impl Tab {
     /// Every panel, in the order of the menu.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::View,
         Self::Outliner,
         Self::Inspector,
         Self::Render,
+        Self::Animation,
         Self::Passes,
+        Self::Acceleration,
         Self::LeftOut,
         Self::Health,
         Self::Log,
@@ -51,7 +57,9 @@ impl Tab {
             Self::Outliner => "Outliner",
             Self::Inspector => "Inspector",
             Self::Render => "Render",
+            Self::Animation => "Animation",
             Self::Passes => "Passes",
+            Self::Acceleration => "Acceleration",
             Self::LeftOut => "Left out",
             Self::Health => "Health",
             Self::Log => "Log",
@@ -65,8 +73,8 @@ pub fn default_layout() -> DockState<Tab> {
     let tree = dock.main_surface_mut();
     let [rest, _right] = tree.split_right(NodeIndex::root(), 0.78, vec![Tab::Inspector, Tab::Render]);
     let [rest, _left] = tree.split_left(rest, 0.22, vec![Tab::Outliner]);
-    let [_view, _below] =
-        tree.split_below(rest, 0.76, vec![Tab::Passes, Tab::LeftOut, Tab::Health, Tab::Log]);
+    let below = vec![Tab::Animation, Tab::Passes, Tab::Acceleration, Tab::LeftOut, Tab::Health, Tab::Log];
+    let [_view, _below] = tree.split_below(rest, 0.76, below);
     dock
 }
 

@@ -204,6 +204,12 @@ impl Device {
         crate::ResourceId(self.next_resource.fetch_add(1, Ordering::Relaxed))
     }
 
+    /// The timeline value that the frame being recorded will reach. Work recorded at value `v` is known to be submitted
+    /// when this is above `v`, and finished when it is at `v + Frames::in_flight()`.
+    pub fn recording(&self) -> u64 {
+        self.submitted.load(Ordering::Acquire) + 1
+    }
+
     /// The timeline value that the device has reached.
     ///
     /// # Errors

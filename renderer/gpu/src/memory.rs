@@ -51,7 +51,7 @@ impl MemoryUse {
 pub struct MemoryBudget {
     /// Bytes that this process may use, by VK_EXT_memory_budget, else the heap's size.
     pub budget_bytes: u64,
-    /// Bytes in use by this process.
+    /// Bytes that this program has taken. (What the driver says counts other programs too where the device is the processor.)
     pub used_bytes: u64,
 }
 
@@ -184,16 +184,9 @@ impl Device {
         let heaps = properties.memory_properties;
         let local = (0..heaps.memory_heap_count as usize)
             .filter(|&i| heaps.memory_heaps[i].flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
-        let mut result = MemoryBudget { budget_bytes: 0, used_bytes: 0 };
-        for heap in local {
-            if self.has_memory_budget() {
-                result.budget_bytes += budget.heap_budget[heap];
-                result.used_bytes += budget.heap_usage[heap];
-            } else {
-                result.budget_bytes += heaps.memory_heaps[heap].size;
-                result.used_bytes = self.memory.total();
-            }
-        }
-        result
+        let known = self.has_memory_budget();
+        let bytes =
+            |heap: usize| if known { budget.heap_budget[heap] } else { heaps.memory_heaps[heap].size };
+        MemoryBudget { budget_bytes: local.map(bytes).sum(), used_bytes: self.memory.total() }
     }
 }

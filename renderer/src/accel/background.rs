@@ -56,7 +56,8 @@ pub(crate) struct Adopted {
 pub(crate) struct Later {
     device: Arc<Device>,
     queue: Background,
-    prepared: Option<Batch>,
+    /// What to submit, once the frame at this value of the timeline has been.
+    prepared: Option<(u64, Batch)>,
     running: Option<(Ticket, Batch, Option<Buffer>)>,
 }
 
@@ -77,7 +78,8 @@ impl Later {
 
     /// BLASes in the batch that is prepared or running.
     pub(crate) fn len(&self) -> usize {
-        let batch = self.running.as_ref().map(|(_, batch, _)| batch).or(self.prepared.as_ref());
+        let prepared = self.prepared.as_ref().map(|(_, batch)| batch);
+        let batch = self.running.as_ref().map(|(_, batch, _)| batch).or(prepared);
         match batch {
             None | Some(Batch::Sizes(_)) => 0,
             Some(Batch::Builds(_, items)) => items.len(),
@@ -87,7 +89,9 @@ impl Later {
 
     /// Submits what the last frame prepared, and takes into use what has finished.
     pub(crate) fn step(&mut self, blases: &mut BlasTable, policy: &AccelPolicy) -> Result<Adopted> {
-        if let Some(batch) = self.prepared.take() {
+        // A scene may be taken in twice in one frame: its copies are then not on their way yet.
+        let recording = self.device.recording();
+        if let Some((_, batch)) = self.prepared.take_if(|(value, _)| *value < recording) {
             self.submit(batch)?;
         }
         let Some((ticket, _, _)) = &self.running else { return Ok(Adopted::default()) };
@@ -170,11 +174,12 @@ impl Later {
         let resting: Vec<u32> = blases.lively.iter().copied().filter(rests).collect();
         let fast = Form::Static { compacted: false };
         let builds = [(first, fast), (loose, Form::Dynamic), (resting, fast)];
-        if let Some((numbers, form)) = builds.into_iter().find(|(numbers, _)| !numbers.is_empty()) {
-            self.prepared = self.builds(recorder, tables, blases, &numbers, form)?;
-        } else if policy.compact && !blases.uncompacted.is_empty() {
-            self.prepared = self.compactions(blases)?;
-        }
+        let batch = match builds.into_iter().find(|(numbers, _)| !numbers.is_empty()) {
+            Some((numbers, form)) => self.builds(recorder, tables, blases, &numbers, form)?,
+            None if policy.compact && !blases.uncompacted.is_empty() => self.compactions(blases)?,
+            None => None,
+        };
+        self.prepared = batch.map(|batch| (self.device.recording(), batch));
         Ok(())
     }
 
@@ -198,7 +203,7 @@ impl Later {
                 None,
                 Some(&snapshot),
             )?;
-            triangles += job.triangles();
+            triangles += job.element_count();
             items.push(Item {
                 number: *number,
                 version: blas.version,

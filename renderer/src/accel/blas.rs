@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use caustica_gpu::{AccelStructure, Device, Recorder, TriangleGeometry};
+use caustica_gpu::{AccelGeometry, AccelStructure, BoxGeometry, Device, Recorder, TriangleGeometry};
 use glam::Vec3;
 
 use crate::delta::{InstanceId, MeshId};
@@ -20,6 +20,38 @@ pub(crate) struct BlasKey {
     pub(crate) opaque: Vec<bool>,
 }
 
+/// The geometries that a BLAS is built from: all of one kind.
+pub(crate) enum BlasInput {
+    Triangles(Vec<TriangleGeometry>),
+    Boxes(Vec<BoxGeometry>),
+}
+
+impl BlasInput {
+    pub(crate) fn geometry(&self) -> AccelGeometry<'_> {
+        match self {
+            Self::Triangles(list) => AccelGeometry::Triangles(list),
+            Self::Boxes(list) => AccelGeometry::Boxes(list),
+        }
+    }
+
+    /// Number of triangles or boxes.
+    pub(crate) fn element_count(&self) -> u64 {
+        match self {
+            Self::Triangles(list) => list.iter().map(|geometry| u64::from(geometry.triangle_count)).sum(),
+            Self::Boxes(list) => list.iter().map(|geometry| u64::from(geometry.count)).sum(),
+        }
+    }
+
+    fn redirect(&mut self, snapshot: &Snapshot) {
+        match self {
+            Self::Triangles(list) => {
+                list.iter_mut().for_each(|geometry| snapshot.redirect_triangles(geometry))
+            }
+            Self::Boxes(list) => list.iter_mut().for_each(|geometry| snapshot.redirect_boxes(geometry)),
+        }
+    }
+}
+
 impl BlasKey {
     pub(crate) fn of(slot: &Slot, tables: &Tables) -> Self {
         let materials = &tables.materials;
@@ -34,23 +66,24 @@ impl BlasKey {
     }
 
     /// Input of a build: of the tables as they are, or of a snapshot of them.
-    pub(crate) fn geometries(
-        &self,
-        tables: &Tables,
-        snapshot: Option<&Snapshot>,
-    ) -> Result<Vec<TriangleGeometry>> {
+    pub(crate) fn geometries(&self, tables: &Tables, snapshot: Option<&Snapshot>) -> Result<BlasInput> {
+        let mesh = tables.meshes.get(self.mesh)?;
         let opaque = self.opaque.iter().enumerate();
-        let mut geometries: Vec<_> = match self.deforming.and_then(|id| tables.deforming.get(id)) {
-            Some(deforming) => opaque.map(|(index, opaque)| deforming.triangles(index, *opaque)).collect(),
+        let mut input = match self.deforming.and_then(|id| tables.deforming.get(id)) {
+            Some(deforming) => BlasInput::Triangles(
+                opaque.map(|(index, opaque)| deforming.triangles(index, *opaque)).collect(),
+            ),
+            None if mesh.shapes.is_some() => {
+                BlasInput::Boxes(opaque.filter_map(|(index, opaque)| mesh.boxes(index, *opaque)).collect())
+            }
             None => {
-                let mesh = tables.meshes.get(self.mesh)?;
-                opaque.map(|(index, opaque)| mesh.triangles(index, *opaque)).collect()
+                BlasInput::Triangles(opaque.map(|(index, opaque)| mesh.triangles(index, *opaque)).collect())
             }
         };
         if let Some(snapshot) = snapshot {
-            geometries.iter_mut().for_each(|geometry| snapshot.redirect(geometry));
+            input.redirect(snapshot);
         }
-        Ok(geometries)
+        Ok(input)
     }
 }
 

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use caustica_gpu::{
-    AccelBuild, AccelGeometry, AccelStructure, Access, Buffer, BufferUse, BuildMode, BuildPreference, Device,
-    Location, MemoryUse, Recorder, ResourceId, Stage, TriangleGeometry, Use,
+    AccelBuild, AccelStructure, Access, Buffer, BufferUse, BuildMode, BuildPreference, Device, Location,
+    MemoryUse, Recorder, ResourceId, Stage, Use,
 };
 
-use super::blas::{BlasKey, Form};
+use super::blas::{BlasInput, BlasKey, Form};
 use crate::error::Result;
 use crate::tables::{Snapshot, Tables};
 
@@ -52,7 +52,7 @@ pub(crate) struct Job {
     pub(crate) structure: Arc<AccelStructure>,
     pub(crate) form: Form,
     pub(crate) mode: BuildMode,
-    geometries: Vec<TriangleGeometry>,
+    input: BlasInput,
     /// Bytes of scratch.
     scratch: u64,
 }
@@ -66,8 +66,8 @@ pub(crate) fn job_of(
     into: Option<&Arc<AccelStructure>>,
     snapshot: Option<&Snapshot>,
 ) -> Result<Job> {
-    let geometries = key.geometries(tables, snapshot)?;
-    let sizes = device.build_sizes(AccelGeometry::Triangles(&geometries), preference(form));
+    let input = key.geometries(tables, snapshot)?;
+    let sizes = device.build_sizes(input.geometry(), preference(form));
     let structure = match into {
         Some(structure) => Arc::clone(structure),
         None => {
@@ -77,18 +77,19 @@ pub(crate) fn job_of(
     };
     let scratch = if mode == BuildMode::Refit { sizes.refit_scratch } else { sizes.build_scratch };
     let alignment = device.limits().scratch_alignment.max(1);
-    Ok(Job { number, structure, form, mode, geometries, scratch: scratch.next_multiple_of(alignment) })
+    Ok(Job { number, structure, form, mode, input, scratch: scratch.next_multiple_of(alignment) })
 }
 
 impl Job {
-    pub(crate) fn triangles(&self) -> u64 {
-        self.geometries.iter().map(|geometry| u64::from(geometry.triangle_count)).sum()
+    /// Number of triangles or boxes.
+    pub(crate) fn element_count(&self) -> u64 {
+        self.input.element_count()
     }
 
     fn build(&self, scratch: u64) -> AccelBuild<'_> {
         AccelBuild {
             target: &self.structure,
-            geometry: AccelGeometry::Triangles(&self.geometries),
+            geometry: self.input.geometry(),
             preference: preference(self.form),
             mode: self.mode,
             scratch,

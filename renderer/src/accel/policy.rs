@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use crate::measure::DeviceProfile;
+
 /// A refitted BLAS whose boxes have grown to more than this multiple of their surface at the last build is rebuilt.
 pub(crate) const SURFACE_LIMIT: f64 = 2.0;
 /// A BLAS that was edited and then rested for this many frames is built once more, to be traced fast.
@@ -12,6 +14,12 @@ pub(crate) const DISPLACEMENT_LIMIT: f64 = 0.02;
 pub(crate) const SMALLEST_DISPLACEMENT: f64 = 4.0;
 /// Scenes up to this many slots sort their instances anew at every build of the TLAS; larger ones when an eighth is new.
 pub(crate) const SORTED_SLOTS: u32 = 4096;
+
+/// The TLAS is refitted unless that takes more than this multiple of a build: a refit leaves every instance where it is in
+/// the tree, so that nothing else has to follow.
+const TLAS_REFIT_LIMIT: f64 = 1.2;
+/// Time that a frame of a window may spend on first builds, milliseconds.
+const FRAME_BUILDS_MS: f64 = 8.0;
 
 /// What the device's profile and the kind of run make of acceleration structures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +43,18 @@ impl Default for AccelPolicy {
 }
 
 impl AccelPolicy {
+    /// What suits a device. In a window no frame waits for the background; elsewhere no figure of the clock decides what a
+    /// frame holds.
+    pub fn of(profile: &DeviceProfile, window: bool) -> Self {
+        Self {
+            refit: profile.refit_pays(),
+            refit_tlas: profile.tlas_refit_ms <= TLAS_REFIT_LIMIT * profile.tlas_build_ms,
+            compact: profile.compaction_pays(),
+            frame_triangles: window.then(|| profile.triangles_in(FRAME_BUILDS_MS)),
+            wait: !window,
+        }
+    }
+
     /// Whether a first build of `triangles` fits into a frame that has already built `before`.
     pub(crate) fn fits_frame(&self, before: u64, triangles: u64) -> bool {
         self.frame_triangles.is_none_or(|limit| before + triangles <= limit)
@@ -77,7 +97,28 @@ fn surface(low: Vec3, high: Vec3) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use caustica_gpu::DeviceKind;
+
     use super::*;
+
+    #[test]
+    fn the_profile_decides_what_pays_and_the_window_what_may_come_later() {
+        let profile = |kind| DeviceProfile::default_of("device", "driver", kind);
+        let (card, processor) = (profile(DeviceKind::Discrete), profile(DeviceKind::Cpu));
+        assert_eq!(AccelPolicy::of(&card, false), AccelPolicy::default());
+        let plain = AccelPolicy { refit: false, compact: false, ..AccelPolicy::default() };
+        assert_eq!(AccelPolicy::of(&processor, false), plain);
+        let triangles = Some(processor.triangles_in(8.0));
+        let shown = AccelPolicy { frame_triangles: triangles, wait: false, ..plain };
+        assert_eq!(AccelPolicy::of(&processor, true), shown);
+
+        let refits_tlas = |tlas_refit_ms| {
+            let mut profile = processor.clone();
+            (profile.tlas_refit_ms, profile.tlas_build_ms) = (tlas_refit_ms, 1.0);
+            AccelPolicy::of(&profile, false).refit_tlas
+        };
+        assert!(refits_tlas(1.2) && !refits_tlas(1.21));
+    }
 
     #[test]
     fn primitives_that_part_stretch_the_tree() {

@@ -32,7 +32,8 @@ struct Known {
 struct Measurement {
     number: u32,
     structure: Weak<AccelStructure>,
-    frame: u64,
+    /// Value of the timeline that the frame which measures will reach.
+    value: u64,
     surfaces: Buffer,
     count: usize,
 }
@@ -75,7 +76,6 @@ impl Surfaces {
         tables: &Tables,
         blases: &BlasTable,
         pass: &BlasSurface,
-        frame: u64,
     ) -> Result<()> {
         let first = self.running.len();
         let mut jobs = Vec::new();
@@ -102,7 +102,8 @@ impl Surfaces {
                 offset += u64::from(cluster_count) * 4;
             }
             let structure = Arc::downgrade(&built.structure);
-            self.running.push(Measurement { number, structure, frame, surfaces, count: count as usize });
+            let value = self.device.recording();
+            self.running.push(Measurement { number, structure, value, surfaces, count: count as usize });
         }
         jobs.retain(|job| job.cluster_count > 0);
         if jobs.is_empty() {
@@ -119,11 +120,12 @@ impl Surfaces {
     }
 
     /// Reads what the device has finished; returns the BLASes that have become too loose.
-    pub(crate) fn read(&mut self, frame: u64) -> Vec<u32> {
-        let in_flight = Frames::in_flight() as u64;
+    pub(crate) fn read(&mut self) -> Vec<u32> {
+        // Not as soon as it has finished, which would depend on the clock, but when it is sure to have.
+        let finished = self.device.recording().saturating_sub(Frames::in_flight() as u64);
         let mut loose = Vec::new();
-        let finished = self.running.iter().take_while(|measurement| measurement.frame + in_flight <= frame);
-        for measurement in self.running.drain(..finished.count()) {
+        let count = self.running.iter().take_while(|measurement| measurement.value <= finished).count();
+        for measurement in self.running.drain(..count) {
             let Some(known) = self.known.get_mut(&measurement.number) else { continue };
             if !known.structure.ptr_eq(&measurement.structure) {
                 continue;

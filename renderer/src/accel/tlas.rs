@@ -16,7 +16,7 @@ use super::order::{Displacement, Places};
 use super::policy::AccelPolicy;
 use crate::delta::Visibility;
 use crate::error::{RendererError, Result};
-use crate::gpu_types::{MASK_CAMERA, MASK_INDIRECT, MASK_SHADOWS, Rows, TLAS_NO_BLAS, TlasSlot};
+use crate::gpu_types::{MASK_CAMERA, MASK_INDIRECT, MASK_SHADOWS, RAY_SHAPES, Rows, TLAS_NO_BLAS, TlasSlot};
 use crate::measure::TlasWork;
 use crate::passes::InstanceDescriptors;
 use crate::tables::{Slot, Table, Tables, shows_both_sides};
@@ -285,7 +285,9 @@ fn record_of(slot: u32, place: u32, tables: &Tables, blases: &BlasTable) -> Tlas
         blases.number_of(slot).filter(|number| blases.get(*number).is_some_and(|blas| blas.built.is_some()));
     // Facing is judged in object space, where glTF's front is Vulkan's without the flip flag.
     let flags = if has_both_sides(entry, tables) { CULL_DISABLE } else { 0 };
-    let mask_flags = mask_of(entry.instance.visibility) | flags << 8;
+    let shapes = tables.meshes.get(entry.instance.mesh).is_ok_and(|mesh| mesh.shapes.is_some());
+    let hit_groups = if shapes { RAY_SHAPES } else { 0 };
+    let mask_flags = mask_of(entry.instance.visibility) | flags << 8 | hit_groups << 16;
     TlasSlot { blas: built.unwrap_or(TLAS_NO_BLAS), mask_flags, place }
 }
 

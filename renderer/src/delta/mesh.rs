@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Vec2, Vec3, Vec4};
 
-/// Triangles with their attributes. All arrays but `tex_coords1` and `colors` hold one entry a vertex;
+/// Triangles with their attributes, or shapes and no triangles. All arrays but `tex_coords1` and `colors` hold one entry a vertex;
 /// those two may be empty. Every index of every geometry is below `positions.len()`.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
@@ -22,10 +22,33 @@ pub struct Mesh {
     pub colors: Vec<Vec4>,
     /// Three indices a triangle, for all geometries one after the other.
     pub indices: Vec<u32>,
+    /// Spheres and boxes; then there are no vertices, no indices and no deformation.
+    pub shapes: Vec<Shape>,
     /// The primitives of the mesh; each becomes one geometry of the BLAS.
     pub geometries: Vec<Geometry>,
     /// How its vertices follow a pose; `None`: rigid. Each instance of a mesh that deforms has vertices and a BLAS of its own.
     pub deformation: Option<Deformation>,
+}
+
+/// What a [`Shape`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShapeKind {
+    /// A sphere; `mesh_from_primitive` and the instance make an ellipsoid of it.
+    Sphere,
+    /// A box with faces along the axes.
+    Box,
+}
+
+/// An analytic shape. Texture coordinates of a sphere are its longitude (from +Z over +X) and its angle from +Y, both as
+/// shares; those of a box run from 0 to 1 on each face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    /// Sphere or box.
+    pub kind: ShapeKind,
+    /// Its centre, primitive space.
+    pub centre: Vec3,
+    /// Half of its size, metres, not negative; of a sphere x is the radius and the rest is ignored. 0: nothing is seen of it.
+    pub half_extent: Vec3,
 }
 
 /// How vertices follow a [`Pose`]: first the morph targets are added, then the joints move the sum (glTF 2.0, 3.7.2.2 and 3.7.3.3).
@@ -61,12 +84,12 @@ pub struct Pose {
     pub weights: Vec<f32>,
 }
 
-/// One primitive of a mesh: a range of its indices.
+/// One primitive of a mesh: a range of its indices, or of its shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
-    /// First index, a multiple of 3.
+    /// First index, a multiple of 3; or first shape.
     pub first_index: u32,
-    /// Number of indices, a multiple of 3.
+    /// Number of indices, a multiple of 3; or of shapes.
     pub index_count: u32,
     /// Places the primitive inside its mesh; identity on import.
     pub mesh_from_primitive: Affine3A,

@@ -24,13 +24,20 @@ pub const MATERIAL_ALPHA_BLEND: u32 = 8;
 /// [`super::Instance::flags`]: the determinant of `render_from_mesh` is below 0.
 pub const INSTANCE_MIRRORED: u32 = 1;
 
-/// Bit of y in the id target: the back side of the triangle was seen.
+/// Bit of y in the id target: the back side of the triangle was seen, or the inside of a shape.
 pub const GBUFFER_BACK: u32 = 0x8000_0000;
 
 /// [`super::Geometry::flags`]: `mesh_from_primitive` is not the identity, now or in the last frame.
 pub const GEOMETRY_MOVED: u32 = 1;
 /// [`super::Geometry::flags`]: the previous vertices or matrix differ from the present ones.
 pub const GEOMETRY_MOVING: u32 = 2;
+/// [`super::Geometry::flags`]: `positions` is the address of [`super::Shape`], there are no attributes and no indices.
+pub const GEOMETRY_SHAPES: u32 = 4;
+
+/// [`super::Shape::kind`].
+pub const SHAPE_SPHERE: u32 = 0;
+/// [`super::Shape::kind`].
+pub const SHAPE_BOX: u32 = 1;
 
 /// Bit of an instance mask: met by camera rays.
 pub const MASK_CAMERA: u32 = 1;
@@ -103,6 +110,17 @@ pub const TLAS_NO_BLAS: u32 = 0xffff_ffff;
 pub const RAY_SURFACE: u32 = 0;
 /// Hit group and miss shader of rays that ask for visibility (`RAY_SHADOW`).
 pub const RAY_SHADOW: u32 = 1;
+/// Hit groups of meshes of shapes stand so much further: the SBT offset of their instances.
+pub const RAY_SHAPES: u32 = 2;
+
+/// Hit kind: a sphere.
+pub const HIT_SPHERE: u32 = 0;
+/// Hit kind: a box.
+pub const HIT_BOX: u32 = 1;
+/// Hit kind: bit of a ray that leaves the shape.
+pub const HIT_LEAVING: u32 = 2;
+/// Hit kinds below this are of shapes.
+pub const HIT_KINDS: u32 = 4;
 /// Instance mask of what every ray sees.
 pub const MASK_ALL: u32 = 0xff;
 

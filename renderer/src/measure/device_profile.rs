@@ -95,7 +95,7 @@ impl DeviceProfile {
         Self::default_of(device.name(), device.driver(), device.kind())
     }
 
-    fn default_of(name: &str, driver: &str, kind: DeviceKind) -> Self {
+    pub(crate) fn default_of(name: &str, driver: &str, kind: DeviceKind) -> Self {
         let [blas_build_ms, blas_fast_build_ms, blas_refit_ms, tlas_build_ms, tlas_refit_ms, compacted_share] =
             match kind {
                 DeviceKind::Cpu => [4.7, 4.7, 4.7, 9.0, 9.0, 1.0],

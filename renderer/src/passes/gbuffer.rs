@@ -9,7 +9,6 @@ use caustica_gpu::{
 use super::{Builder, Scope};
 use crate::error::Result;
 use crate::gpu_types::Push;
-use crate::settings::Pipeline;
 use crate::shader::merge_interfaces;
 use crate::tables::Batch;
 use crate::view::Targets;
@@ -21,8 +20,8 @@ pub(crate) enum GBuffer {
 }
 
 impl GBuffer {
-    pub(crate) fn new(builder: &mut Builder<'_>, pipeline: Pipeline) -> Result<Self> {
-        if pipeline == Pipeline::Raytraced {
+    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+        if builder.needs.primary_rays {
             return Ok(Self::Rays { trace: builder.rays("gbuffer.trace", "passes/gbuffer/gbuffer.rgen")? });
         }
         let alpha = builder.needs.alpha;

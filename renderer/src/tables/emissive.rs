@@ -133,6 +133,9 @@ fn collect(
     weights: &mut Vec<f64>,
 ) {
     let Ok(mesh) = meshes.get(entry.instance.mesh) else { return };
+    if mesh.shapes.is_some() {
+        return; // shapes shine where rays meet them, but none is drawn as a light
+    }
     for (geometry, id) in entry.instance.materials.iter().enumerate() {
         let Some(material) = materials.get(*id).filter(|material| emits(material)) else { continue };
         let luminance = f64::from(material.emissive.dot(Vec3::new(0.2126, 0.7152, 0.0722)));

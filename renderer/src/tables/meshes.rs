@@ -1,4 +1,4 @@
-//! Meshes on the device: vertices and indices in device-local memory, one geometry record a primitive.
+//! Meshes on the device: vertices and indices, or shapes, in device-local memory, one geometry record a primitive.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -7,10 +7,12 @@ use caustica_gpu::{Buffer, BufferUse, Device, Location, MemoryUse, Recorder, Res
 use glam::{Affine3A, Vec3};
 
 use super::deformation::DeformationBuffers;
+use super::shapes::{self, ShapeBuffers};
 use super::spatial_order::sort_triangles;
 use crate::delta::{self, Mesh, MeshId};
 use crate::error::{RendererError, Result};
-use crate::gpu_types::{self, GEOMETRY_MOVED, GEOMETRY_MOVING, Rows, VertexAttributes};
+use crate::gpu_types::{self, GEOMETRY_MOVED, GEOMETRY_MOVING, GEOMETRY_SHAPES, Rows, VertexAttributes};
+use crate::passes::ShapeBoxes;
 
 /// Offset of `mesh_from_primitive` inside a geometry record; acceleration structure builds read it there.
 pub(super) const TRANSFORM_OFFSET: u64 =
@@ -26,6 +28,8 @@ pub(crate) struct Vertices {
 /// One mesh on the device.
 pub(crate) struct GpuMesh {
     pub(crate) vertices: Arc<Vertices>,
+    /// Its spheres and boxes; `None`: triangles.
+    pub(crate) shapes: Option<Arc<ShapeBuffers>>,
     /// Geometry records, as on the device.
     records: Vec<gpu_types::Geometry>,
     pub(crate) geometries: Buffer,
@@ -79,9 +83,14 @@ impl GpuMesh {
         self.host.geometries.len() as u32
     }
 
+    /// Number of triangles or shapes of all primitives: what a build takes.
+    pub(crate) fn element_count(&self) -> u64 {
+        self.records.iter().map(|record| u64::from(record.triangle_count)).sum()
+    }
+
     /// Number of triangles of all primitives.
     pub(crate) fn triangle_count(&self) -> u64 {
-        self.records.iter().map(|record| u64::from(record.triangle_count)).sum()
+        if self.shapes.is_some() { 0 } else { self.element_count() }
     }
 
     /// Input of a BLAS build for geometry `index`.
@@ -95,6 +104,12 @@ impl GpuMesh {
             transform: self.geometries.address() + record_offset(index) + TRANSFORM_OFFSET,
             opaque,
         }
+    }
+
+    /// Input of a BLAS build for geometry `index` of a mesh of shapes.
+    pub(crate) fn boxes(&self, index: usize, opaque: bool) -> Option<caustica_gpu::BoxGeometry> {
+        let geometry = self.host.geometries.get(index)?;
+        Some(self.shapes.as_ref()?.input(geometry, opaque))
     }
 
     /// Bounds of primitive `index` where it stands now, mesh space.
@@ -112,6 +127,8 @@ pub(crate) struct Meshes {
     moved_last_frame: BTreeSet<(MeshId, u32)>,
     /// Records that differ from those on the device.
     dirty: BTreeSet<(MeshId, u32)>,
+    /// Primitives of shapes whose boxes are not those of where they stand.
+    unboxed: BTreeSet<(MeshId, u32)>,
 }
 
 impl Meshes {
@@ -122,6 +139,7 @@ impl Meshes {
             triangle_count: 0,
             moved_last_frame: BTreeSet::new(),
             dirty: BTreeSet::new(),
+            unboxed: BTreeSet::new(),
         }
     }
 
@@ -144,6 +162,7 @@ impl Meshes {
             let (usage, kind) = (BufferUse::Geometry, MemoryUse::Geometry);
             Buffer::new(&self.device, &name, size as u64, usage, Location::Device, kind)
         };
+        let shapes = ShapeBuffers::new(&self.device, recorder, &mesh)?.map(Arc::new);
         let attributes = attributes_of(&mesh);
         let vertices = Arc::new(Vertices {
             positions: make("positions", mesh.positions.len() * 12)?,
@@ -153,12 +172,14 @@ impl Meshes {
         recorder.upload(&vertices.positions, 0, bytemuck::cast_slice(&mesh.positions))?;
         recorder.upload(&vertices.attributes, 0, bytemuck::cast_slice(&attributes))?;
         recorder.upload(&vertices.indices, 0, bytemuck::cast_slice(&mesh.indices))?;
-        let records: Vec<_> = mesh.geometries.iter().map(|geometry| record_of(geometry, &vertices)).collect();
+        let record = |geometry| record_of(geometry, &vertices, shapes.as_deref());
+        let records: Vec<_> = mesh.geometries.iter().map(record).collect();
         let geometries = make("geometries", size_of_val(records.as_slice()))?;
         self.dirty.extend((0..records.len() as u32).map(|geometry| (id, geometry)));
+        self.unboxed.extend((0..records.len() as u32).map(|geometry| (id, geometry)));
         let bounds: Vec<_> = mesh.geometries.iter().map(|geometry| bounds_of(&mesh, geometry)).collect();
         let centre = centre_of(&mesh, &bounds);
-        let new = GpuMesh { vertices, records, geometries, deformation, host: mesh, bounds, centre };
+        let new = GpuMesh { vertices, shapes, records, geometries, deformation, host: mesh, bounds, centre };
         self.triangle_count += new.triangle_count();
         let old = self.by_id.insert(id, new);
         self.triangle_count -= old.as_ref().map_or(0, GpuMesh::triangle_count);
@@ -187,12 +208,13 @@ impl Meshes {
             record.previous_mesh_from_primitive = record.mesh_from_primitive;
         }
         record.mesh_from_primitive = rows_of(mesh_from_primitive);
-        record.flags = GEOMETRY_MOVED | GEOMETRY_MOVING;
+        record.flags = (record.flags & GEOMETRY_SHAPES) | GEOMETRY_MOVED | GEOMETRY_MOVING;
         self.moved_last_frame.insert((id, geometry));
         let host = &mut Arc::make_mut(&mut mesh.host).geometries[geometry as usize];
         let old = std::mem::replace(&mut host.mesh_from_primitive, *mesh_from_primitive);
         mesh.centre = centre_of(&mesh.host, &mesh.bounds);
         self.dirty.insert((id, geometry));
+        self.unboxed.insert((id, geometry));
         Ok(turned(&old) != turned(mesh_from_primitive))
     }
 
@@ -202,7 +224,8 @@ impl Meshes {
             let Some(mesh) = self.by_id.get_mut(&id) else { continue };
             let Some(record) = mesh.records.get_mut(geometry as usize) else { continue };
             record.previous_mesh_from_primitive = record.mesh_from_primitive;
-            record.flags = moved_flag(&mesh.host.geometries[geometry as usize].mesh_from_primitive);
+            let moved = moved_flag(&mesh.host.geometries[geometry as usize].mesh_from_primitive);
+            record.flags = (record.flags & GEOMETRY_SHAPES) | moved;
             self.dirty.insert((id, geometry));
         }
     }
@@ -222,6 +245,31 @@ impl Meshes {
         Ok(())
     }
 
+    /// Makes the boxes around the shapes that are new or have moved; the records must be uploaded. `group`: stands for the
+    /// geometry in the barrier tracker.
+    pub(crate) fn make_boxes(
+        &mut self,
+        recorder: &mut Recorder,
+        pass: &ShapeBoxes,
+        group: ResourceId,
+    ) -> Result<()> {
+        let job = |(id, geometry): &(MeshId, u32)| {
+            let mesh = self.by_id.get(id)?;
+            let range = mesh.host.geometries.get(*geometry as usize)?;
+            let record = mesh.geometries.address() + record_offset(*geometry as usize);
+            Some(mesh.shapes.as_ref()?.job(range, record)).filter(|job| job.count > 0)
+        };
+        let jobs: Vec<_> = self.unboxed.iter().filter_map(job).collect();
+        pass.record(recorder, &jobs, group)?;
+        self.unboxed.clear();
+        Ok(())
+    }
+
+    /// Whether some mesh holds shapes.
+    pub(crate) fn hold_shapes(&self) -> bool {
+        self.by_id.values().any(|mesh| mesh.shapes.is_some())
+    }
+
     pub(crate) fn remove(&mut self, id: MeshId) {
         if let Some(old) = self.by_id.remove(&id) {
             self.triangle_count -= old.triangle_count();
@@ -237,16 +285,34 @@ fn record_offset(index: usize) -> u64 {
     (index * size_of::<gpu_types::Geometry>()) as u64
 }
 
-fn record_of(geometry: &delta::Geometry, vertices: &Vertices) -> gpu_types::Geometry {
+fn record_of(
+    geometry: &delta::Geometry,
+    vertices: &Vertices,
+    shapes: Option<&ShapeBuffers>,
+) -> gpu_types::Geometry {
+    let (mesh_from_primitive, moved) =
+        (rows_of(&geometry.mesh_from_primitive), moved_flag(&geometry.mesh_from_primitive));
+    if let Some(shapes) = shapes {
+        let records = shapes.records_address(geometry);
+        return gpu_types::Geometry {
+            positions: records,
+            previous_positions: records,
+            triangle_count: geometry.index_count,
+            flags: GEOMETRY_SHAPES | moved,
+            mesh_from_primitive,
+            previous_mesh_from_primitive: mesh_from_primitive,
+            ..bytemuck::Zeroable::zeroed()
+        };
+    }
     gpu_types::Geometry {
         positions: vertices.positions.address(),
         previous_positions: vertices.positions.address(),
         attributes: vertices.attributes.address(),
         indices: vertices.indices.address() + u64::from(geometry.first_index) * 4,
         triangle_count: geometry.index_count / 3,
-        flags: moved_flag(&geometry.mesh_from_primitive),
-        mesh_from_primitive: rows_of(&geometry.mesh_from_primitive),
-        previous_mesh_from_primitive: rows_of(&geometry.mesh_from_primitive),
+        flags: moved,
+        mesh_from_primitive,
+        previous_mesh_from_primitive: mesh_from_primitive,
         ..bytemuck::Zeroable::zeroed()
     }
 }
@@ -270,9 +336,13 @@ pub(crate) fn rows_of(map: &Affine3A) -> Rows {
     ]
 }
 
-/// Bounds of a primitive, primitive space; a point at the origin when it has no triangles.
+/// Bounds of a primitive, primitive space; a point at the origin when it is empty.
 fn bounds_of(mesh: &Mesh, geometry: &delta::Geometry) -> (Vec3, Vec3) {
     let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
+    if !mesh.shapes.is_empty() {
+        let boxes = mesh.shapes[range].iter().map(shapes::bounds_of);
+        return boxes.reduce(join).unwrap_or((Vec3::ZERO, Vec3::ZERO));
+    }
     let points = mesh.indices[range].iter().map(|i| mesh.positions[*i as usize]);
     points.map(|p| (p, p)).reduce(join).unwrap_or((Vec3::ZERO, Vec3::ZERO))
 }
@@ -297,19 +367,24 @@ fn centre_of(mesh: &Mesh, bounds: &[(Vec3, Vec3)]) -> Vec3 {
     all.reduce(join).map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5)
 }
 
-/// The mesh with the triangles of each geometry in spatial order.
+/// The mesh with the triangles or shapes of each geometry in spatial order.
 fn in_spatial_order(mesh: &Mesh) -> Mesh {
     // What deforms is on the device alone.
     let mut sorted = Mesh { deformation: None, ..mesh.clone() };
     for geometry in &mesh.geometries {
         let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
-        sort_triangles(&mesh.positions, &mut sorted.indices[range]);
+        if mesh.shapes.is_empty() {
+            sort_triangles(&mesh.positions, &mut sorted.indices[range]);
+        } else {
+            shapes::sort_shapes(&mut sorted.shapes[range]);
+        }
     }
     sorted
 }
 
 /// Refuses a mesh that would read out of bounds or that the device cannot take.
 fn check(mesh: &Mesh, device: &Device) -> Result<()> {
+    shapes::check(mesh)?;
     let n = mesh.positions.len();
     let refuse = |what: &str, asked: usize, limit: u64| {
         Err(RendererError::Limit {
@@ -335,7 +410,7 @@ fn check(mesh: &Mesh, device: &Device) -> Result<()> {
     if let Some(index) = mesh.indices.iter().max().filter(|index| **index as usize >= n) {
         return refuse("vertex index", *index as usize, n as u64);
     }
-    for geometry in &mesh.geometries {
+    for geometry in mesh.geometries.iter().filter(|_| mesh.shapes.is_empty()) {
         let end = geometry.first_index as usize + geometry.index_count as usize;
         if end > mesh.indices.len() || !geometry.index_count.is_multiple_of(3) {
             return refuse("end of a primitive", end, mesh.indices.len() as u64);
@@ -345,8 +420,10 @@ fn check(mesh: &Mesh, device: &Device) -> Result<()> {
     if mesh.geometries.len() as u64 > limits.max_geometries {
         return refuse("primitives", mesh.geometries.len(), limits.max_geometries);
     }
-    if mesh.indices.len() as u64 / 3 > limits.max_primitives {
-        return refuse("triangles", mesh.indices.len() / 3, limits.max_primitives);
+    for (what, len) in [("triangles", mesh.indices.len() / 3), ("shapes", mesh.shapes.len())] {
+        if len as u64 > limits.max_primitives {
+            return refuse(what, len, limits.max_primitives);
+        }
     }
     Ok(())
 }

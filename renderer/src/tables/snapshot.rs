@@ -1,31 +1,40 @@
 //! A copy of what frames may write while a build in the background reads it. Vertices of rigid meshes never change and are
-//! only held; the geometry records, and the vertices of an instance that deforms, are copied.
+//! only held; the geometry records, the vertices of an instance that deforms, and the boxes around shapes are copied.
 
 use std::sync::Arc;
 
 use caustica_gpu::{
-    Access, Buffer, BufferUse, Location, MemoryUse, Recorder, ResourceId, Stage, TriangleGeometry, Use,
+    Access, BoxGeometry, Buffer, BufferUse, Location, MemoryUse, Recorder, ResourceId, Stage,
+    TriangleGeometry, Use,
 };
 
 use super::meshes::Vertices;
+use super::shapes::ShapeBuffers;
 use crate::error::Result;
 
 /// Input of a build that later frames leave alone.
-pub(crate) struct Snapshot {
-    _vertices: Arc<Vertices>,
-    records: Copied,
-    positions: Option<Copied>,
+pub(crate) enum Snapshot {
+    /// Of a mesh of triangles, or of an instance of it that deforms.
+    Triangles { _vertices: Arc<Vertices>, records: Copied, positions: Option<Copied> },
+    /// Of a mesh of shapes.
+    Boxes(Copied),
 }
 
 /// A buffer and the address of what it is a copy of.
-struct Copied {
+pub(crate) struct Copied {
     copy: Buffer,
     original: u64,
 }
 
+impl Copied {
+    fn redirect(&self, address: &mut u64) {
+        *address = self.copy.address() + (*address - self.original);
+    }
+}
+
 impl Snapshot {
     /// Records the copies. `group`: stands for the geometry in the barrier tracker.
-    pub(crate) fn new(
+    pub(crate) fn of_triangles(
         recorder: &mut Recorder,
         vertices: &Arc<Vertices>,
         records: &Buffer,
@@ -33,18 +42,36 @@ impl Snapshot {
         group: ResourceId,
     ) -> Result<Self> {
         recorder.declare(&[Use::Group(group, Stage::Transfer, Access::TransferRead)]);
-        Ok(Self {
+        Ok(Self::Triangles {
             _vertices: Arc::clone(vertices),
             records: copy(recorder, records)?,
             positions: positions.map(|buffer| copy(recorder, buffer)).transpose()?,
         })
     }
 
+    /// Records the copy of the boxes around shapes. `group`: stands for the geometry in the barrier tracker.
+    pub(crate) fn of_shapes(
+        recorder: &mut Recorder,
+        shapes: &ShapeBuffers,
+        group: ResourceId,
+    ) -> Result<Self> {
+        recorder.declare(&[Use::Group(group, Stage::Transfer, Access::TransferRead)]);
+        Ok(Self::Boxes(copy(recorder, &shapes.boxes)?))
+    }
+
     /// Makes a geometry read the copies.
-    pub(crate) fn redirect(&self, geometry: &mut TriangleGeometry) {
-        geometry.transform = self.records.copy.address() + (geometry.transform - self.records.original);
-        if let Some(positions) = &self.positions {
-            geometry.positions = positions.copy.address() + (geometry.positions - positions.original);
+    pub(crate) fn redirect_triangles(&self, geometry: &mut TriangleGeometry) {
+        let Self::Triangles { records, positions, .. } = self else { return };
+        records.redirect(&mut geometry.transform);
+        if let Some(positions) = positions {
+            positions.redirect(&mut geometry.positions);
+        }
+    }
+
+    /// Makes a geometry read the copies.
+    pub(crate) fn redirect_boxes(&self, geometry: &mut BoxGeometry) {
+        if let Self::Boxes(boxes) = self {
+            boxes.redirect(&mut geometry.boxes);
         }
     }
 }

@@ -6,7 +6,6 @@ use caustica_gpu::{Device, Format, Image, ImageDesc, ImageUse};
 
 use crate::error::Result;
 use crate::needs::Needs;
-use crate::settings::{Pipeline, ViewSettings};
 
 /// Images that the next frame reads as its past: two of each, taken in turns.
 pub(crate) struct History {
@@ -35,18 +34,12 @@ pub(crate) struct Targets {
 }
 
 impl Targets {
-    pub(crate) fn new(
-        device: &Arc<Device>,
-        extent: [u32; 2],
-        needs: &Needs,
-        settings: &ViewSettings,
-        window: bool,
-    ) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, extent: [u32; 2], needs: &Needs, window: bool) -> Result<Self> {
         let make = |name: &str, format| {
             Image::new(device, name, ImageDesc { extent, format, mip_levels: 1, usage: ImageUse::Target })
         };
         let depth = |name: &str| {
-            if settings.pipeline == Pipeline::Raytraced {
+            if needs.primary_rays {
                 return make(name, Format::R32Float);
             }
             let desc = ImageDesc { extent, format: Format::Depth32, mip_levels: 1, usage: ImageUse::Depth };

@@ -14,7 +14,7 @@ InstanceDescriptor describe(InstanceDescriptorJob job, uint slot, TlasSlot entry
     InstanceDescriptor descriptor;
     descriptor.render_from_mesh = InstanceTable(job.instances).at[slot].render_from_mesh;
     descriptor.index_mask = (slot & 0xffffffu) | entry.mask_flags << 24;
-    descriptor.offset_flags = entry.mask_flags >> 8 << 24;
+    descriptor.offset_flags = (entry.mask_flags >> 16 & 0xffu) | entry.mask_flags >> 8 << 24;
     descriptor.blas = entry.blas != TLAS_NO_BLAS ? AddressTable(job.blases).at[entry.blas] : 0ul;
     vec4 rows[3] = descriptor.render_from_mesh;
     if (descriptor.blas == 0ul || !(is_finite(rows[0]) && is_finite(rows[1]) && is_finite(rows[2]))) {

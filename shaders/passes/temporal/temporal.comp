@@ -9,8 +9,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "shared/frame.glsl"
 #include "lib/camera.glsl"
+#include "lib/element.glsl"
 #include "lib/octahedral.glsl"
-#include "lib/triangle.glsl"
 
 layout(set = 1, binding = 0) uniform utexture2D gbuffer_id;
 layout(set = 1, binding = 1) uniform utexture2D gbuffer_normal;
@@ -103,9 +103,8 @@ float depth_tolerance(Frame frame, float depth, float cosine) {
 // Reverse depth that the surface had in the last frame; below 0: behind the camera.
 float expected_depth(Frame frame, Scene scene, uvec2 pixel, uvec4 id) {
     CameraRay ray = camera_ray(frame, camera_sample_position(frame, pixel));
-    Triangle triangle = triangle_fetch(scene, id.x - 1u, id.y & ~GBUFFER_BACK, id.z);
-    vec2 barycentric = clamp_barycentric(triangle_line_barycentric(triangle, ray.origin, ray.direction));
-    vec3 position = triangle_previous_position(scene, id.x - 1u, id.y & ~GBUFFER_BACK, triangle, barycentric);
+    Element element = element_on_line(scene, id.x - 1u, id.y, id.z, ray.origin, ray.direction);
+    vec3 position = element_previous_position(scene, id.x - 1u, id.y, element);
     vec4 clip = frame.previous_clip_from_render * vec4(position, 1.0);
     return clip.w > 0.0 ? clip.z / clip.w : -1.0;
 }

@@ -47,7 +47,7 @@ fn scene() -> Scene {
         instance.previous_render_from_mesh = [[PI, f32::NAN, 0.0, 1.0]; 3];
         let blas = if random.unit() < 0.2 { TLAS_NO_BLAS } else { random.bits() as u32 % 16 };
         instances.push(instance);
-        slots.push(TlasSlot { blas, mask_flags: random.bits() as u32 & 0xffff, place });
+        slots.push(TlasSlot { blas, mask_flags: random.bits() as u32 & 0xff_ffff, place });
     }
     Scene { instances, slots, blases }
 }
@@ -55,12 +55,14 @@ fn scene() -> Scene {
 impl Scene {
     fn expected(&self, slot: usize) -> [u8; 64] {
         let TlasSlot { blas, mask_flags, .. } = self.slots[slot];
-        let [mask, flags, ..] = mask_flags.to_le_bytes();
+        let [mask, flags, hit_groups, _] = mask_flags.to_le_bytes();
         let rows = self.instances[slot].render_from_mesh;
         let address = if blas == TLAS_NO_BLAS { 0 } else { self.blases[blas as usize] };
         let sound = address != 0 && rows.iter().flatten().all(|entry| entry.is_finite());
         let (rows, address) = if sound { (rows, address) } else { (IDENTITY, 0) };
-        pack_instance(rows, slot as u32, mask, flags, address)
+        let mut bytes = pack_instance(rows, slot as u32, mask, flags, address);
+        bytes[52] = hit_groups;
+        bytes
     }
 
     /// Runs the pass over these slots, or over the first `count`; the descriptors by place.

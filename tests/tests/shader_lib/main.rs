@@ -15,5 +15,6 @@ mod lights;
 mod offsets;
 mod random;
 mod scatter;
+mod shape_surface;
 mod shapes;
 mod table_pass;

@@ -1,0 +1,183 @@
+//! The frames of a session and what is read from them. Enters: a size, a pixel. Leaves: recorded commands, images,
+//! figures. The document only has its changes drained here.
+
+use std::collections::BTreeSet;
+
+use caustica_renderer::Statistics;
+use caustica_renderer::gpu::{Acquired, Image, Recorder};
+use caustica_scene::{Document, NodeId, Target};
+
+use super::{HostTimes, Lap, Pick, Session, Tally};
+use crate::sync::{camera_of, instance_id};
+
+/// A still view stops asking for frames at this many samples.
+const CONVERGED_SAMPLES: u64 = 4096;
+
+impl Session {
+    /// Syncs the document and records one frame of the view, `extent_px` large.
+    ///
+    /// # Errors
+    /// When a shader does not compile or fit, memory runs out, or the device is lost.
+    pub fn begin_frame(&mut self, extent_px: [u32; 2]) -> anyhow::Result<Recorder> {
+        let mut lap = Lap::start();
+        let mut recorder = self.frames.begin()?;
+        self.renderer.note_times(self.view, &self.frames)?;
+        self.host_times.begin_ms = lap.ms();
+        match self.record(&mut recorder, extent_px) {
+            Ok(()) => Ok(recorder),
+            Err(error) => {
+                // Uploads and builds recorded until then count as done: they must reach the device.
+                self.frames.submit(recorder, None)?;
+                Err(error)
+            }
+        }
+    }
+
+    fn record(&mut self, recorder: &mut Recorder, extent_px: [u32; 2]) -> anyhow::Result<()> {
+        if std::mem::take(&mut self.resync) {
+            // Marked first: should this fail too, the next frame still sends everything.
+            self.document.mark_all_added("tried again");
+            self.renderer.apply(recorder, &std::mem::take(&mut self.sync).clear())?;
+        }
+        let mut lap = Lap::start();
+        let delta = self.sync.delta(&mut self.document, self.camera.world_from_camera.translation);
+        self.host_times.sync_ms = lap.ms();
+        let selection_stale = self.selection_changed || !delta.instances.is_empty();
+        if let Err(error) = self.renderer.apply(recorder, &delta) {
+            // Half of the change is in: the next frame sends the whole scene again.
+            self.resync = true;
+            return Err(error.into());
+        }
+        self.host_times.apply_ms = lap.ms();
+        if selection_stale {
+            self.renderer.select(self.view, outlined(&self.document, &self.selection).into_iter())?;
+            self.selection_changed = false;
+        }
+        let camera = camera_of(
+            &self.camera.world_from_camera,
+            self.camera.projection,
+            self.camera.near_m,
+            self.sync.origin(),
+        );
+        let view = self.renderer.view_mut(self.view)?;
+        view.resize(extent_px);
+        view.set_camera(camera);
+        self.renderer.render(recorder, self.view)?;
+        self.tally.note(self.renderer.statistics(self.view)?);
+        self.host_times.render_ms = lap.ms();
+        Ok(())
+    }
+
+    /// Where the host's time of the last frame went.
+    pub fn host_times(&self) -> HostTimes {
+        self.host_times
+    }
+
+    /// Starts a frame that leaves the view's image as it was: the window repaints its panels alone.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn begin_ui_frame(&mut self) -> anyhow::Result<Recorder> {
+        let recorder = self.frames.begin()?;
+        self.renderer.note_times(self.view, &self.frames)?;
+        Ok(recorder)
+    }
+
+    /// Submits a frame.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn submit(&mut self, recorder: Recorder, window: Option<&Acquired>) -> anyhow::Result<()> {
+        self.frames.submit(recorder, window)?;
+        Ok(())
+    }
+
+    /// Waits for everything submitted and takes the newest times over.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn finish(&mut self) -> anyhow::Result<()> {
+        self.frames.finish()?;
+        self.renderer.note_times(self.view, &self.frames)?;
+        Ok(())
+    }
+
+    /// The image for the window, holding srgb(x)^2.2; `None` before the first frame.
+    pub fn window_image(&self) -> Option<&Image> {
+        self.renderer.view(self.view).ok().and_then(|view| view.window_image())
+    }
+
+    /// Samples accumulated.
+    pub fn samples(&self) -> u64 {
+        self.renderer.view(self.view).map_or(0, |view| view.samples())
+    }
+
+    /// Whether more frames would hardly change the image.
+    pub fn is_converged(&self) -> bool {
+        self.samples() >= CONVERGED_SAMPLES
+    }
+
+    /// Whether nothing is left to do: no sample, and no structure that is still built or made better.
+    pub fn is_done(&self) -> bool {
+        self.is_converged() && !self.renderer.is_busy()
+    }
+
+    /// What is seen through a pixel of the last frame. Waits for the device.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn pick(&mut self, pixel: [u32; 2]) -> anyhow::Result<Option<Pick>> {
+        let Some(hit) = self.renderer.pick(&mut self.frames, self.view, pixel)? else { return Ok(None) };
+        let node = NodeId(hit.instance.node);
+        let is_prefab = self.document.node(node).is_some_and(|node| node.prefab().is_some());
+        let target = if is_prefab { Target::part(node, hit.instance.part) } else { Target::node(node) };
+        let centre = [pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5];
+        let (origin, direction) = self.renderer.camera_ray(self.view, centre)?;
+        let forward = -self.camera.world_from_camera.z_axis.normalize();
+        let world_position = hit.distance_m.map(|distance_m| {
+            let along = f64::from(distance_m) / direction.as_dvec3().dot(forward);
+            self.sync.origin() + origin.as_dvec3() + direction.as_dvec3() * along
+        });
+        Ok(Some(Pick { target, primitive: hit.geometry, world_position }))
+    }
+
+    /// Figures of the last frame.
+    pub fn statistics(&self) -> &Statistics {
+        static NOTHING: std::sync::LazyLock<Statistics> = std::sync::LazyLock::new(Statistics::default);
+        self.renderer.statistics(self.view).unwrap_or(&NOTHING)
+    }
+
+    /// What all frames did together.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// The accumulated radiance. Waits for the device.
+    ///
+    /// # Errors
+    /// When there is no frame yet or the device is lost.
+    pub fn read_back(&mut self) -> anyhow::Result<caustica_renderer::Accumulated> {
+        Ok(self.renderer.read_back(&mut self.frames, self.view)?)
+    }
+
+    /// The tone-mapped image, linear. Waits for the device.
+    ///
+    /// # Errors
+    /// When there is no frame yet or the device is lost.
+    pub fn read_display(&mut self) -> anyhow::Result<Vec<[f32; 4]>> {
+        Ok(self.renderer.read_display(&mut self.frames, self.view)?)
+    }
+}
+
+/// Instances of the selected targets and of everything below them.
+fn outlined(document: &Document, selection: &BTreeSet<Target>) -> Vec<caustica_renderer::delta::InstanceId> {
+    let mut waiting: Vec<Target> = selection.iter().copied().collect();
+    let mut found = Vec::new();
+    while let Some(target) = waiting.pop() {
+        if document.mesh_of(target).is_some() {
+            found.push(instance_id(target));
+        }
+        waiting.extend(document.children_of(target));
+    }
+    found
+}

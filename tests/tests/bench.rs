@@ -1,0 +1,121 @@
+//! `caustica bench` in its small sizes: what it writes, what it refuses, and what must hold whatever the machine's speed. No
+//! time is judged here.
+#![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
+
+use std::path::Path;
+
+use caustica_renderer::gpu_types::Instance;
+use caustica_tests::program::{Run, caustica};
+use serde_json::{Value, json};
+
+/// A quick run with validation on; the layer must be silent. Gives what the file holds.
+fn bench(folder: &Path, more: &[&str]) -> (Run, Value) {
+    let mut arguments =
+        vec!["bench", "--suite", "accel", "--quick", "--validation", "-o", "out/figures.json"];
+    arguments.extend(more);
+    let run = caustica(folder, &arguments);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(!run.stderr.contains("validation"), "{}", run.stderr);
+    let text = std::fs::read_to_string(folder.join("out/figures.json")).expect("a file of figures");
+    (run, serde_json::from_str(&text).expect("JSON in the file"))
+}
+
+fn rows<'a>(part: &'a Value, name: &str) -> &'a [Value] {
+    part[name].as_array().expect("rows")
+}
+
+fn number(row: &Value, name: &str) -> u64 {
+    row[name].as_u64().expect("a whole number")
+}
+
+#[test]
+fn a_move_costs_the_same_bytes_in_any_document_and_is_seen_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (run, figures) = bench(folder.path(), &["--only", "moves", "--commit", "abc123"]);
+    assert_eq!((&figures["commit"], &figures["quick"]), (&json!("abc123"), &json!(true)));
+    assert!(figures["date"].as_str().is_some_and(|date| date.len() == 10), "{figures}");
+    let moves = &figures["accel"]["moves"];
+    let record = size_of::<Instance>() as u64;
+    for pipeline in ["raytraced", "hybrid"] {
+        let of_pipeline: Vec<&Value> =
+            rows(moves, "rows").iter().filter(|row| row["pipeline"] == pipeline).collect();
+        let nodes: Vec<u64> = of_pipeline.iter().map(|row| number(row, "nodes")).collect();
+        assert_eq!(nodes, [1, 100, 1000]);
+        for row in &of_pipeline {
+            assert_eq!(number(row, "latency_frames"), 1, "{row}");
+            assert_eq!((number(row, "blas_builds"), number(row, "tlas_builds")), (0, 0), "{row}");
+            assert_eq!(number(row, "tlas_refits"), number(row, "moves"), "{row}");
+            assert!(row["scene_ms"]["median"].as_f64() > Some(0.0), "{row}");
+            assert!(row["accel_ms"]["median"].as_f64() > Some(0.0), "{row}");
+            // The record, and what the pass that writes its descriptor is told; then the record once more.
+            assert!((record + 4..=record + 64).contains(&number(row, "moved_bytes")), "{row}");
+            assert_eq!(number(row, "settled_bytes"), record, "{row}");
+        }
+        assert_eq!(of_pipeline[1]["moved_bytes"], of_pipeline[2]["moved_bytes"]);
+    }
+    assert_eq!(rows(moves, "edits").len(), 9 * 3);
+    for title in ["One node moves: the host", "One node moves: the device", "Other edits"] {
+        assert!(run.stdout.contains(title), "{}", run.stdout);
+    }
+}
+
+#[test]
+fn structures_and_skinned_meshes_are_measured() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (run, figures) = bench(folder.path(), &["--only", "structures,skinned", "--json"]);
+    let printed: Value = serde_json::from_str(&run.stdout).expect("one object on standard output");
+    assert_eq!(printed, figures);
+    assert_eq!((&figures["accel"]["moves"], &figures["accel"]["soak"]), (&Value::Null, &Value::Null));
+    let structures = &figures["accel"]["structures"];
+    let sizes =
+        |name: &str| -> Vec<u64> { rows(structures, name).iter().map(|row| number(row, "count")).collect() };
+    assert_eq!((sizes("blas"), sizes("tlas")), (vec![1000, 10_000, 2000], vec![1, 1000]));
+    for row in rows(structures, "blas") {
+        for figure in ["build_fast_build_ms", "compact_ms", "bytes", "compacted_bytes"] {
+            assert!(row[figure].as_f64() > Some(0.0), "{figure}: {row}");
+        }
+        assert!(
+            row["build_fast_trace"]["ms"].as_f64() > Some(0.0) && row["refit"]["ms"].as_f64() > Some(0.0)
+        );
+    }
+    let dances = rows(&figures["accel"]["skinned"], "rows");
+    let work: Vec<(u64, u64, u64)> = dances
+        .iter()
+        .map(|row| (number(row, "frames"), number(row, "blas_refits"), number(row, "blas_builds")))
+        .collect();
+    assert_eq!(work, [(8, 80, 0), (8, 0, 80)], "ten meshes, all in every frame");
+    assert!(dances.iter().all(|row| row["deform_ms"]["median"].as_f64() > Some(0.0)));
+}
+
+#[test]
+fn three_hundred_edits_taken_back_leave_the_device_as_it_was() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (_, figures) = bench(folder.path(), &["--only", "soak"]);
+    let soak = &figures["accel"]["soak"];
+    let looks = rows(soak, "looks");
+    let cycles: Vec<u64> = looks.iter().map(|look| number(look, "cycles")).collect();
+    assert_eq!(cycles, [100, 300]);
+    assert_eq!(looks[0]["device_bytes"], looks[1]["device_bytes"], "bytes by kind");
+    for kind in ["acceleration_structures", "geometry", "tables", "targets", "staging"] {
+        assert!(looks[0]["device_bytes"][kind].as_u64() > Some(0), "{kind}: {looks:?}");
+    }
+    assert_eq!(soak["document_unchanged"], true);
+    assert_eq!(soak["steady"]["device_growth_bytes"], 0);
+}
+
+#[test]
+fn wrong_names_and_places_are_refused_before_anything_is_measured() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = caustica(folder.path(), &["bench", "--suite", "speed", "-o", "a.json"]);
+    assert_eq!(run.code, Some(2));
+    assert!(run.stderr.contains("speed") && run.stderr.contains("accel"), "{}", run.stderr);
+    let run = caustica(folder.path(), &["bench", "--quick"]);
+    assert_eq!(run.code, Some(2), "no file is named: {}", run.stderr);
+    std::fs::write(folder.path().join("file"), "in the way").expect("a file");
+    let run = caustica(folder.path(), &["bench", "--quick", "-o", "file/a.json"]);
+    assert_eq!((run.code, run.stdout.contains("One node")), (Some(1), false), "{}", run.stderr);
+    assert!(run.stderr.contains("file/a.json"), "{}", run.stderr);
+    let run = caustica(folder.path(), &["bench", "--quick", "-o", "a.json", "--device", "no such card"]);
+    assert_eq!(run.code, Some(3), "{}", run.stderr);
+    assert!(!folder.path().join("a.json").exists());
+}

@@ -12,7 +12,7 @@ mod log_buffer;
 mod panels;
 mod playback;
 mod projection;
-mod session;
+pub mod session;
 mod sync;
 mod theme;
 mod ui_renderer;

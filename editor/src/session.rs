@@ -5,6 +5,7 @@ mod camera;
 mod files;
 mod frame;
 mod host_times;
+mod inventory;
 mod tally;
 
 use std::collections::BTreeSet;
@@ -181,7 +182,7 @@ impl Session {
     pub fn cancel_gesture(&mut self) {
         if let Some(step) = self.history.cancel_gesture() {
             self.note_picture(&step.edit);
-            if let Err(error) = self.document.apply(step.edit) {
+            if let Err(error) = self.document.apply_back(step.edit) {
                 tracing::error!("taking a gesture back failed: {error}");
             }
         }
@@ -191,7 +192,7 @@ impl Session {
     pub fn undo(&mut self) -> Option<String> {
         let step = self.history.take_undo()?;
         self.note_picture(&step.edit);
-        match self.document.apply(step.edit.clone()) {
+        match self.document.apply_back(step.edit.clone()) {
             Ok(redo) => self.history.put_redo(&step, redo),
             Err(error) => tracing::error!("undo of '{}' failed: {error}", step.label),
         }
@@ -202,7 +203,7 @@ impl Session {
     pub fn redo(&mut self) -> Option<String> {
         let step = self.history.take_redo()?;
         self.note_picture(&step.edit);
-        match self.document.apply(step.edit.clone()) {
+        match self.document.apply_back(step.edit.clone()) {
             Ok(undo) => self.history.put_undo(&step, undo),
             Err(error) => tracing::error!("redo of '{}' failed: {error}", step.label),
         }
@@ -277,11 +278,7 @@ impl Session {
 
     /// Empties the renderer's scene before another document is synced.
     fn replace_scene(&mut self) -> anyhow::Result<()> {
-        let emptied = std::mem::take(&mut self.sync).clear();
-        let mut recorder = self.frames.begin()?;
-        let applied = self.renderer.apply(&mut recorder, &emptied);
-        self.frames.submit(recorder, None)?;
-        applied?;
+        self.empty_renderer()?;
         self.picture_revision += 1;
         self.history.clear();
         self.selection.clear();

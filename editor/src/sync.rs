@@ -9,7 +9,7 @@ mod origin;
 use std::collections::{BTreeMap, BTreeSet};
 
 use caustica_renderer::delta::{self, SceneDelta};
-use caustica_scene::{ChangeSet, Document, Environment, Renderable, Target};
+use caustica_scene::{ChangeSet, Document, Environment, MeshId, Renderable, Target};
 use glam::{DAffine3, DVec3};
 
 use assets::{Assets, InUse};
@@ -84,17 +84,28 @@ impl Sync {
         delta
     }
 
-    /// Only the targets themselves count, never what hangs below them. A primitive that moves inside its mesh counts when
-    /// the instance is next moved or sent: to follow it at once would cost every instance of the mesh.
+    /// Only the targets themselves count, never what hangs below them. Meshes that change count for all their rigid
+    /// instances at once; those that deform are looked at one by one, as they are built one by one.
     fn note_extents(&mut self, document: &Document, changes: &ChangeSet) {
         for target in changes.removed.keys() {
             self.extents.remove(*target);
         }
-        for target in changes.added.keys().chain(changes.transforms.keys()).chain(&changes.poses) {
-            match document.own_bounds(*target) {
-                Some((low, high)) => self.extents.set(*target, (high - low).length()),
-                None => self.extents.remove(*target),
-            }
+        let meshes: BTreeSet<MeshId> = changes
+            .primitive_transforms
+            .iter()
+            .map(|(mesh, _)| *mesh)
+            .chain(changes.meshes.iter().copied())
+            .collect();
+        let mut resized: BTreeSet<Target> = changes.poses.clone();
+        for id in meshes {
+            self.extents.resize(document, id);
+            resized.extend(self.assets.users_if_deforming(id));
+        }
+        for changed in [&changes.added, &changes.transforms, &changes.instances] {
+            resized.extend(changed.keys());
+        }
+        for target in resized.into_iter().filter(|target| !changes.removed.contains_key(target)) {
+            self.extents.note(document, target);
         }
     }
 

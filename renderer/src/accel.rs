@@ -144,14 +144,14 @@ impl Accel {
         } else {
             dirty.slots = changed.slots.iter().copied().collect();
         }
+        dirty.reused = if changed.all { count } else { changed.reused.len() as u32 };
+        let mut swapped = false;
         for slot in &dirty.slots {
             let key = tables.instances.get(*slot).map(|entry| BlasKey::of(entry, tables));
-            if self.blases.assign(*slot, key) {
-                dirty.reused += 1;
-            }
+            swapped |= self.blases.assign(*slot, key);
         }
         self.blases.tidy();
-        if dirty.reused > 0 {
+        if swapped {
             self.surfaces.tidy();
         }
         dirty.slots.retain(|slot| *slot < count);
@@ -315,6 +315,16 @@ impl Accel {
             Some(buffer) => Download::of(recorder, buffer),
             None => Ok(Download::default()),
         }
+    }
+
+    /// Records the copy of the addresses that descriptors are made with back to the host.
+    pub(crate) fn download_addresses(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.blases.download(recorder)
+    }
+
+    /// Number of the BLAS of a slot.
+    pub(crate) fn number_of(&self, slot: u32) -> Option<u32> {
+        self.blases.number_of(slot)
     }
 
     /// Where the descriptor of a slot stands.

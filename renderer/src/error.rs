@@ -66,6 +66,12 @@ pub enum RendererError {
         /// The id.
         id: String,
     },
+    /// What is on the device is not what the host believes.
+    #[error("the tables contradict each other: {reason}")]
+    Contradiction {
+        /// What was found.
+        reason: String,
+    },
     /// A device was not measured, or its profile was not written.
     #[error("{what}: {reason}")]
     Profile {

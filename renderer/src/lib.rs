@@ -21,7 +21,7 @@ pub use accel::AccelPolicy;
 pub use accumulation::{Accumulation, BLOCK_SAMPLES, Sample};
 pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
-pub use inventory::{InstanceEntry, Inventory};
+pub use inventory::{EnvironmentEntry, InstanceEntry, Inventory, Layout, MeshEntry, Place};
 pub use measure::{
     AccelBench, AccelStatistics, BlasTimes, DeviceProfile, LeftOut, ProfileInForce, Statistics, TlasTimes,
     TlasWork,

@@ -105,7 +105,7 @@ impl Renderer {
         if !delta.is_empty() {
             let applied = self.tables.apply(recorder, delta, &mut self.changed);
             applied.inspect_err(|_| self.changed.all = true)?;
-            if changes_needs(delta) {
+            if changes_needs(delta) || self.summary.emissive_triangles != self.tables.emissive.len() {
                 self.summary = summarize(&self.tables);
             }
             let what =
@@ -346,7 +346,7 @@ impl Renderer {
     }
 }
 
-/// Whether a delta can change what is needed: transforms and poses cannot.
+/// Whether a delta can change what is needed: transforms and poses cannot, but for emitters that lose or get a size.
 fn changes_needs(delta: &SceneDelta) -> bool {
     !(delta.meshes.is_empty()
         && delta.materials.is_empty()

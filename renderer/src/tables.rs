@@ -26,7 +26,7 @@ use caustica_gpu::{Access, Device, Recorder, ResourceId, Stage, Use};
 pub(crate) use draws::Batch;
 pub(crate) use instances::{Instances, Slot};
 pub(crate) use materials::{Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits};
-pub(crate) use meshes::{Meshes, rows_of};
+pub(crate) use meshes::{MeshBuffers, Meshes, rows_of};
 pub(crate) use snapshot::Snapshot;
 pub(crate) use spatial_order::order_of;
 pub(crate) use table::{Download, Table};
@@ -50,6 +50,8 @@ pub(crate) struct Changed {
     pub(crate) all: bool,
     /// Slots that are new or free, or of another mesh, material or visibility.
     pub(crate) slots: BTreeSet<u32>,
+    /// Slots that were taken, given up or given to another mesh: nothing there stands where it stood.
+    pub(crate) reused: BTreeSet<u32>,
     /// Slots of which the transform changed.
     pub(crate) moved: Vec<u32>,
     /// Meshes with new content.
@@ -186,7 +188,13 @@ impl Tables {
         Snapshot::of_triangles(recorder, &mesh.vertices, records, positions, self.geometry_group)
     }
 
-    fn record(&self) -> gpu_types::Scene {
+    /// Records the copy of the `Scene` record back to the host.
+    pub(crate) fn download_scene(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.scene.download(recorder)
+    }
+
+    /// What all shaders begin with, as the tables are now.
+    pub(crate) fn record(&self) -> gpu_types::Scene {
         let (environment_width, environment_height) = self.environment.grid();
         gpu_types::Scene {
             instances: self.instances.address(),

@@ -56,6 +56,8 @@ pub struct Document {
     /// Instances whose source has clips.
     animated: BTreeSet<NodeId>,
     surroundings: Surroundings,
+    /// An edit is being undone: what it sets was in the document before, and need not fit what has become of it since.
+    restoring: bool,
 }
 
 /// A node with what is derived from it.
@@ -124,6 +126,7 @@ impl Document {
             time_s: None,
             animated: BTreeSet::new(),
             surroundings: Surroundings::default(),
+            restoring: false,
         }
     }
 

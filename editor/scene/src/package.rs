@@ -144,7 +144,7 @@ impl Document {
     }
 
     /// The edit that puts a new reading of the source in a prefab's place. Assets keep their ids by their
-    /// place in the file; materials that were edited stay as they were edited.
+    /// place in the file; materials that were edited stay as they were edited, primitives that were moved stay moved.
     ///
     /// # Errors
     /// When the prefab is not in the document.
@@ -159,6 +159,13 @@ impl Document {
             {
                 entry.value = now.value.clone();
             }
+        }
+        for (id, mesh) in &mut package.meshes {
+            let old = self.mesh(*id).map_or(&[][..], |old| &old.primitives);
+            for (primitive, old) in mesh.primitives.iter_mut().zip(old) {
+                primitive.mesh_from_primitive = old.mesh_from_primitive;
+            }
+            mesh.update_bounds();
         }
         Ok(Edit::ReplacePrefab(Box::new(package)))
     }

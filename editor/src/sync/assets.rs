@@ -102,6 +102,12 @@ impl Assets {
         users
     }
 
+    /// Who places a mesh that deforms, or did before it changed.
+    pub(super) fn users_if_deforming(&self, mesh: MeshId) -> impl Iterator<Item = Target> {
+        let known = self.meshes.get(&mesh).filter(|known| known.shape.deforms());
+        known.into_iter().flat_map(|known| &known.users).copied()
+    }
+
     /// How poses of a mesh look.
     pub(super) fn shape_of(&self, mesh: MeshId) -> Shape {
         self.meshes.get(&mesh).map(|known| known.shape).unwrap_or_default()
@@ -117,7 +123,9 @@ impl Assets {
         for id in materials {
             let Some(material) = document.material(id) else { continue };
             let Some((_, old)) = self.materials.get_mut(&id) else { continue };
-            let used: Vec<TextureId> = material.textures().map(|used| used.texture).collect();
+            // A texture that its prefab has taken along is shown as none.
+            let textures_used = material.textures().map(|used| used.texture);
+            let used: Vec<TextureId> = textures_used.filter(|id| document.texture(*id).is_some()).collect();
             let old = std::mem::replace(old, used.clone());
             for texture in &used {
                 let count = self.textures.entry(*texture).or_insert(0);
@@ -127,7 +135,8 @@ impl Assets {
                 }
             }
             self.release_textures(&old);
-            delta.materials.push((delta::MaterialId(id.0), material_of(material)));
+            let is_there = |texture: TextureId| document.texture(texture).is_some();
+            delta.materials.push((delta::MaterialId(id.0), material_of(material, is_there)));
         }
         for id in textures.into_iter().filter(|id| self.textures.get(id).is_some_and(|count| *count > 0)) {
             if let Some(texture) = document.texture(id) {

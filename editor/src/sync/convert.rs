@@ -97,10 +97,13 @@ pub fn texture_of(texture: &scene::Texture) -> delta::Texture {
     }
 }
 
-/// A material.
-pub fn material_of(material: &scene::Material) -> delta::Material {
+/// A material. Textures that are gone are left out.
+pub fn material_of(
+    material: &scene::Material,
+    is_there: impl Fn(scene::TextureId) -> bool,
+) -> delta::Material {
     let texture = |used: &Option<scene::TextureUse>| {
-        used.map(|used| delta::TextureUse {
+        used.filter(|used| is_there(used.texture)).map(|used| delta::TextureUse {
             texture: delta::TextureId(used.texture.0),
             tex_coord: used.tex_coord,
             offset: used.offset,

@@ -24,6 +24,7 @@ const BATCH_BYTES: u64 = 256 << 20;
 struct Item {
     number: u32,
     version: u64,
+    content: u64,
     structure: Arc<AccelStructure>,
     form: Form,
     boxes: Vec<(glam::Vec3, glam::Vec3)>,
@@ -206,6 +207,7 @@ impl Later {
             items.push(Item {
                 number: *number,
                 version: blas.version,
+                content: blas.content,
                 structure: Arc::clone(&job.structure),
                 form,
                 boxes: super::boxes_of(tables, blas.key.mesh),
@@ -242,6 +244,7 @@ impl Later {
             let item = Item {
                 number,
                 version: blas.version,
+                content: blas.content,
                 structure,
                 form: Form::Static { compacted: true },
                 boxes: built.boxes.clone(),
@@ -254,11 +257,12 @@ impl Later {
 }
 
 /// Takes a structure into use where it still fits: a static one must be of the present geometry, a dynamic one can be
-/// refitted to it.
+/// refitted to it when only places of vertices and primitives have changed.
 fn adopt(item: Item, blases: &mut BlasTable, adopted: &mut Adopted) {
     let Some(blas) = blases.get(item.number) else { return };
     let current = blas.version == item.version;
-    if !current && (item.form != Form::Dynamic || blas.built.is_none()) {
+    let refittable = item.form == Form::Dynamic && blas.content == item.content && blas.built.is_some();
+    if !current && !refittable {
         return;
     }
     adopted.appeared |= blas.built.is_none();

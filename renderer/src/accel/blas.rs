@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use crate::delta::{InstanceId, MeshId};
 use crate::error::Result;
-use crate::tables::{Slot, Snapshot, Table, Tables};
+use crate::tables::{Download, Slot, Snapshot, Table, Tables};
 
 /// What a BLAS is made for.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -116,6 +116,8 @@ pub(crate) struct Blas {
     pub(crate) changed_at: u64,
     /// Another one with every change of its geometry: what was begun before is told from what fits.
     pub(crate) version: u64,
+    /// Another one with every mesh content: what was built from another cannot be refitted to this one.
+    pub(crate) content: u64,
     /// Bytes that it would take when compacted, once they are known.
     pub(crate) compacted_size: Option<u64>,
 }
@@ -208,6 +210,7 @@ impl BlasTable {
             built: None,
             changed_at: 0,
             version: self.next_version,
+            content: self.next_version,
             compacted_size: None,
         });
         self.addresses.set(number as usize, 0);
@@ -249,8 +252,10 @@ impl BlasTable {
         self.waiting.remove(&number);
         self.unbuilt.insert(number);
         self.addresses.set(number as usize, 0);
+        self.next_version += 1;
+        let content = self.next_version;
         let Some(blas) = self.entries.get_mut(number as usize).and_then(Option::as_mut) else { return };
-        blas.compacted_size = None;
+        (blas.content, blas.compacted_size) = (content, None);
         if let Some(old) = blas.built.take() {
             self.bytes -= old.structure.size();
         }
@@ -328,6 +333,11 @@ impl BlasTable {
 
     pub(crate) fn address(&self) -> u64 {
         self.addresses.address()
+    }
+
+    /// Records the copy of the addresses back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.addresses.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {

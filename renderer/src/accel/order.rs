@@ -87,6 +87,12 @@ impl Displacement {
         }
     }
 
+    /// The scene reaches as far as these centres, whatever has been farther out before. Those of free slots are not finite.
+    pub(crate) fn enclose(&mut self, centres: &[DVec3]) {
+        self.bounds = None;
+        centres.iter().for_each(|centre| self.reach(centre.as_vec3()));
+    }
+
     /// Whether the tree has become loose.
     pub(crate) fn demands_build(&self, count: usize) -> bool {
         self.sum > (DISPLACEMENT_LIMIT * count as f64).max(SMALLEST_DISPLACEMENT)
@@ -112,6 +118,22 @@ mod tests {
         assert!(!many.wants_sorting() && many.of(10_000) == 10_000);
         many.follow(12_000, 1999);
         assert!(many.wants_sorting());
+    }
+
+    #[test]
+    fn what_was_far_out_once_counts_no_more_once_the_places_are_sorted() {
+        let mut displacement = Displacement::default();
+        displacement.reach(Vec3::X * 1e6);
+        let centres: Vec<DVec3> = (0..100).map(|i| DVec3::X * f64::from(i)).chain([DVec3::NAN]).collect();
+        let crowd = |displacement: &mut Displacement| {
+            (0..20).for_each(|slot| displacement.note(slot, Vec3::X * 5.0, Vec3::X * 45.0));
+        };
+        crowd(&mut displacement);
+        assert!(!displacement.demands_build(100), "forty metres of a thousand kilometres");
+        displacement.reset();
+        displacement.enclose(&centres);
+        crowd(&mut displacement);
+        assert!(displacement.demands_build(100));
     }
 
     #[test]

@@ -116,7 +116,10 @@ impl Tlas {
             self.follow_displacement(*slot, tables);
         }
         let loose = self.displacement.demands_build(tables.instances.len());
-        if self.places.wants_sorting() || (loose && !policy.refit_tlas) {
+        // Sorted places are those of another tree, and what has taken a slot does not stand where its last owner stood.
+        let sorts = self.places.wants_sorting() || (loose && !policy.refit_tlas);
+        let rebuild = sorts || dirty.reused > 0 || loose || !policy.refit_tlas;
+        if sorts {
             self.sort(tables);
             dirty.slots = (0..count).collect();
         }
@@ -125,11 +128,7 @@ impl Tlas {
         }
         let grown = self.make_descriptors(count)?;
         self.write_descriptors(recorder, tables, blases, pass, &dirty, grown, groups)?;
-        let rebuild = !self.exists()
-            || self.activity_changed
-            || count != self.built_count
-            || loose
-            || !policy.refit_tlas;
+        let rebuild = rebuild || !self.exists() || self.activity_changed || count != self.built_count;
         recorder.pass("accel.tlas", |recorder| self.build(recorder, count, rebuild, scratch, groups))?;
         Ok(if rebuild { TlasWork::Built } else { TlasWork::Refit })
     }
@@ -156,6 +155,7 @@ impl Tlas {
         let centres: Vec<DVec3> =
             (0..self.places.len()).map(|slot| centre(slot).unwrap_or(DVec3::NAN)).collect();
         self.places.sort(&centres);
+        self.displacement.enclose(&centres);
     }
 
     /// Brings the record of one slot up to date.

@@ -119,12 +119,16 @@ impl Tables {
     fn apply_instances(&mut self, delta: &SceneDelta, changed: &mut Changed) -> Result<BTreeSet<u32>> {
         let mut redrawn = BTreeSet::new();
         for id in &delta.removed_instances {
-            redrawn.extend(self.instances.remove(*id));
+            changed.reused.extend(self.instances.remove(*id));
             self.deforming.remove(*id);
         }
+        redrawn.extend(&changed.reused);
         for (id, instance) in &delta.instances {
             self.deforming.set(*id, instance, &self.meshes)?;
+            let old = self.instances.slot_of(*id).and_then(|slot| self.instances.get(slot));
+            let takes_place = old.is_none_or(|old| old.instance.mesh != instance.mesh);
             let slot = self.instances.set(*id, instance, &self.meshes, &self.materials)?;
+            changed.reused.extend(takes_place.then_some(slot));
             self.instances.set_geometries(slot, self.geometries_of(*id, instance.mesh)?);
             redrawn.insert(slot);
         }
@@ -168,6 +172,7 @@ impl Tables {
             .map(|(slot, entry)| (slot, entry.id, entry.instance.mesh))
             .collect();
         for (slot, id, mesh) in found {
+            self.instances.check_materials(slot, &self.meshes)?;
             self.instances.set_geometries(slot, self.geometries_of(id, mesh)?);
             changed.slots.insert(slot);
             redrawn.insert(slot);
@@ -176,7 +181,7 @@ impl Tables {
     }
 
     /// Address of the geometry records of an instance: its own when it deforms, else those of its mesh.
-    fn geometries_of(&self, id: InstanceId, mesh: MeshId) -> Result<u64> {
+    pub(crate) fn geometries_of(&self, id: InstanceId, mesh: MeshId) -> Result<u64> {
         match self.deforming.get(id) {
             Some(deforming) => Ok(deforming.geometries_address()),
             None => Ok(self.meshes.get(mesh)?.geometries_address()),

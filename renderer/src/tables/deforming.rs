@@ -13,7 +13,7 @@ use caustica_gpu::{
 use glam::Affine3A;
 
 use super::deformation::DeformationBuffers;
-use super::meshes::{GpuMesh, Meshes, TRANSFORM_OFFSET, rows_of};
+use super::meshes::{GpuMesh, MeshBuffers, Meshes, TRANSFORM_OFFSET, rows_of};
 use crate::delta::{Instance, InstanceId, MeshId, Pose};
 use crate::error::Result;
 use crate::gpu_types::{DeformJob, GEOMETRY_MOVED, GEOMETRY_MOVING, Geometry, VertexAttributes};
@@ -153,6 +153,11 @@ impl Deforming {
         self.by_id.get(&id)
     }
 
+    /// All instances that deform, in order of id.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (InstanceId, &DeformingMesh)> {
+        self.by_id.iter().map(|(id, deforming)| (*id, deforming))
+    }
+
     /// A frame has gone by: what changed shape in it has its present shape as its previous one.
     pub(crate) fn settle(&mut self) {
         for id in std::mem::take(&mut self.moved_last_frame) {
@@ -288,6 +293,11 @@ impl DeformingMesh {
     /// Address of the geometry records.
     pub(crate) fn geometries_address(&self) -> u64 {
         self.geometries.address()
+    }
+
+    /// Its buffers, to be read back.
+    pub(crate) fn buffers(&self) -> MeshBuffers<'_> {
+        MeshBuffers { vertices: vec![&self.positions, &self.attributes], geometries: &self.geometries }
     }
 
     /// Input of a BLAS build for geometry `index`.

@@ -140,12 +140,14 @@ fn collect(
         let Some(material) = materials.get(*id).filter(|material| emits(material)) else { continue };
         let luminance = f64::from(material.emissive.dot(Vec3::new(0.2126, 0.7152, 0.0722)));
         let range = &mesh.host.geometries[geometry];
-        let place = entry.instance.render_from_mesh * range.mesh_from_primitive;
+        let [outer, inner] = [entry.instance.render_from_mesh, range.mesh_from_primitive]
+            .map(|map| Mat3::from(map.matrix3).as_dmat3());
+        let linear = outer * inner;
         let indices = &mesh.host.indices[range.first_index as usize..][..range.index_count as usize];
         for (primitive, corner) in indices.chunks_exact(3).enumerate() {
-            let [a, b, c] =
-                [0, 1, 2].map(|i| place.transform_point3(mesh.host.positions[corner[i] as usize]).as_dvec3());
-            let area = (b - a).cross(c - a).length() * 0.5;
+            // Of edges, not of placed corners: where the triangle stands must not round its area.
+            let [a, b, c] = [0, 1, 2].map(|i| mesh.host.positions[corner[i] as usize].as_dvec3());
+            let area = (linear * (b - a)).cross(linear * (c - a)).length() * 0.5;
             if area > 0.0 && area.is_finite() {
                 let (geometry, primitive) = (geometry as u32, primitive as u32);
                 triangles.push(EmissiveTriangle { instance: slot, geometry, primitive, pad0: 0 });

@@ -9,7 +9,7 @@ use caustica_gpu::{
 use glam::Vec3;
 
 use super::alias;
-use super::table::Table;
+use super::table::{Download, Table};
 use crate::delta::{Environment, RadianceMap};
 use crate::error::Result;
 use crate::gpu_types::AliasEntry;
@@ -111,6 +111,11 @@ impl EnvironmentTable {
 
     pub(crate) fn alias_address(&self) -> u64 {
         self.alias.address()
+    }
+
+    /// Records the copy of the alias table back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
+        self.alias.download(recorder)
     }
 
     pub(crate) fn is_dirty(&self) -> bool {

@@ -61,14 +61,7 @@ impl Instances {
     ) -> Result<u32> {
         let mesh = meshes.get(instance.mesh)?;
         let count = mesh.geometry_count();
-        if instance.materials.len() != count as usize {
-            let (asked, limit) = (instance.materials.len() as u64, u64::from(count));
-            return Err(RendererError::Limit {
-                what: String::from("materials of an instance"),
-                asked,
-                limit,
-            });
-        }
+        check_materials(instance, count)?;
         let indices: Vec<u32> =
             instance.materials.iter().map(|m| materials.index(*m)).collect::<Result<_>>()?;
         let known = self.by_id.get(&id).copied();
@@ -116,6 +109,12 @@ impl Instances {
         self.slots[slot as usize] =
             Some(Slot { id, instance: instance.clone(), degenerate, material_base, geometry_count: count });
         Ok(slot)
+    }
+
+    /// Refuses what an instance has become under a mesh with another number of geometries.
+    pub(crate) fn check_materials(&self, slot: u32, meshes: &Meshes) -> Result<()> {
+        let Some(entry) = self.get(slot) else { return Ok(()) };
+        check_materials(&entry.instance, meshes.get(entry.instance.mesh)?.geometry_count())
     }
 
     /// Moves an instance. Returns its slot, and whether it is drawn differently: mirrored or degenerate, or no longer.
@@ -283,6 +282,15 @@ impl Instances {
     fn free_range(&mut self, start: u32, count: u32) {
         self.free_ranges.entry(count).or_default().push(start);
     }
+}
+
+/// An instance has one material for each geometry of its mesh.
+fn check_materials(instance: &Instance, geometry_count: u32) -> Result<()> {
+    let (asked, limit) = (instance.materials.len() as u64, u64::from(geometry_count));
+    if asked == limit {
+        return Ok(());
+    }
+    Err(RendererError::Limit { what: String::from("materials of an instance"), asked, limit })
 }
 
 /// Fills in what follows from the transform.

@@ -59,6 +59,11 @@ impl Materials {
         if let Some((index, _)) = self.by_id.remove(&id) {
             self.free.push(index);
         }
+        // A scene loaded afresh lies as in a new renderer.
+        if self.by_id.is_empty() {
+            self.table.clear();
+            self.free.clear();
+        }
     }
 
     /// Every material with its index.

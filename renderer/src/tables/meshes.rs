@@ -43,7 +43,21 @@ pub(crate) struct GpuMesh {
     pub(crate) centre: Vec3,
 }
 
+/// Everything that a mesh, or an instance that deforms, has on the device.
+pub(crate) struct MeshBuffers<'a> {
+    /// Positions, attributes and, where they are its own, indices.
+    pub(crate) vertices: Vec<&'a Buffer>,
+    /// Geometry records.
+    pub(crate) geometries: &'a Buffer,
+}
+
 impl GpuMesh {
+    /// Its buffers, to be read back.
+    pub(crate) fn buffers(&self) -> MeshBuffers<'_> {
+        let Vertices { positions, attributes, indices } = self.vertices.as_ref();
+        MeshBuffers { vertices: vec![positions, attributes, indices], geometries: &self.geometries }
+    }
+
     /// Address of the geometry records.
     pub(crate) fn geometries_address(&self) -> u64 {
         self.geometries.address()

@@ -92,47 +92,56 @@ impl Textures {
         self.by_id.get(&id).map_or(NO_TEXTURE, |entry| entry.slot)
     }
 
-    /// Uploads a texture, or its new content. A new texture takes a slot that no running frame reads.
+    /// Uploads a texture, or its new content. It keeps its slot, which materials name that are not sent again; frames
+    /// that run go on to read the old image in sets of their own.
     pub(crate) fn set(
         &mut self,
         recorder: &mut Recorder,
         id: TextureId,
         texture: &delta::Texture,
     ) -> Result<()> {
-        let capacity = self.sets[0].set.capacity();
-        let slot = match self.free.pop() {
-            Some(slot) => slot,
-            None if self.next < capacity => {
-                self.next += 1;
-                self.next - 1
-            }
-            None => {
-                let (asked, limit) = (u64::from(self.next), u64::from(capacity - 1));
-                return Err(RendererError::Limit { what: String::from("textures"), asked, limit });
-            }
-        };
         let desc = desc_of(texture.width, texture.height, texture.srgb, texture.sampler.mipmaps);
         let image = Image::new(&self.device, &texture.name, desc)?;
         recorder.upload_image(&image, &texture.rgba8)?;
         let sampler = sampler_of(&self.device, &mut self.samplers, texture.sampler)?;
+        let slot = match self.by_id.get(&id) {
+            Some(known) => known.slot,
+            None => self.take_slot()?,
+        };
         self.mark_stale(slot);
         self.by_slot.insert(slot, id);
-        if let Some(old) = self.by_id.insert(id, Entry { slot, image, sampler }) {
-            self.release(old.slot);
-        }
+        self.by_id.insert(id, Entry { slot, image, sampler });
         Ok(())
     }
 
+    fn take_slot(&mut self) -> Result<u32> {
+        if let Some(slot) = self.free.pop() {
+            return Ok(slot);
+        }
+        let capacity = self.sets[0].set.capacity();
+        if self.next >= capacity {
+            let (asked, limit) = (u64::from(self.next), u64::from(capacity - 1));
+            return Err(RendererError::Limit { what: String::from("textures"), asked, limit });
+        }
+        self.next += 1;
+        Ok(self.next - 1)
+    }
+
     pub(crate) fn remove(&mut self, id: TextureId) {
-        if let Some(entry) = self.by_id.remove(&id) {
-            self.release(entry.slot);
+        let Some(entry) = self.by_id.remove(&id) else { return };
+        self.by_slot.remove(&entry.slot);
+        self.mark_stale(entry.slot);
+        self.free.push(entry.slot);
+        // A scene loaded afresh lies as in a new renderer.
+        if self.by_id.is_empty() {
+            self.free.clear();
+            self.next = 1;
         }
     }
 
-    fn release(&mut self, slot: u32) {
-        self.by_slot.remove(&slot);
-        self.mark_stale(slot);
-        self.free.push(slot);
+    /// All textures in order of id, with their slots.
+    pub(crate) fn ids(&self) -> impl Iterator<Item = (TextureId, u32)> {
+        self.by_id.iter().map(|(id, entry)| (*id, entry.slot))
     }
 
     fn mark_stale(&mut self, slot: u32) {

@@ -2,10 +2,10 @@
 //! Edits of the tree are in `apply_tree.rs`, those of prefabs in `apply_prefab.rs`.
 
 use super::Document;
-use crate::assets::{Camera, Environment, Light, Material};
+use crate::assets::{Camera, Environment, Light, Material, TextureUse};
 use crate::changes::Content;
 use crate::edit::{Edit, EditError, OverrideField};
-use crate::ids::{MaterialId, MeshId, Target};
+use crate::ids::{MaterialId, MeshId, Target, TextureId};
 use crate::node::{Node, NodeKind, RayVisibility};
 use crate::package::MaterialEntry;
 use crate::prefab::PartOverride;
@@ -21,6 +21,18 @@ impl Document {
         let inverse = self.carry_out(edit)?;
         self.changes.add_reason(reason);
         Ok(inverse)
+    }
+
+    /// Carries out an edit that [`Self::apply`] or this has returned: undo and redo. It may set what nobody could choose
+    /// any more, because a source was read again and has lost it: the document had it, and gets it back.
+    ///
+    /// # Errors
+    /// When the document is not as it was after the edit that this one undoes.
+    pub fn apply_back(&mut self, edit: Edit) -> Result<Edit, EditError> {
+        self.restoring = true;
+        let applied = self.apply(edit);
+        self.restoring = false;
+        applied
     }
 
     fn carry_out(&mut self, edit: Edit) -> Result<Edit, EditError> {
@@ -68,9 +80,11 @@ impl Document {
             match self.carry_out(edit) {
                 Ok(inverse) => inverses.push(inverse),
                 Err(error) => {
+                    let restoring = std::mem::replace(&mut self.restoring, true);
                     for inverse in inverses.into_iter().rev() {
                         self.carry_out(inverse)?;
                     }
+                    self.restoring = restoring;
                     return Err(error);
                 }
             }
@@ -167,15 +181,26 @@ impl Document {
         primitive: u32,
         material: MaterialId,
     ) -> Result<Edit, EditError> {
-        self.require_material(material)?;
-        let mesh = self.mesh_of(target).ok_or(EditError::WrongKind { target, wanted: "mesh" })?;
-        let count = self.mesh(mesh).map_or(0, |mesh| mesh.primitives.len());
-        if primitive as usize >= count {
-            return Err(EditError::NoPrimitive { primitive });
+        let mesh = self.mesh_of(target);
+        let own: Vec<MaterialId> = mesh
+            .and_then(|id| self.mesh(id))
+            .iter()
+            .flat_map(|mesh| &mesh.primitives)
+            .map(|p| p.material)
+            .collect();
+        if !self.restoring {
+            self.require_material(material)?;
+            mesh.ok_or(EditError::WrongKind { target, wanted: "mesh" })?;
+            if primitive as usize >= own.len() {
+                return Err(EditError::NoPrimitive { primitive });
+            }
         }
         let inverse = match target.part {
             None => match &mut self.node_mut(target)?.kind {
                 NodeKind::Mesh { materials, .. } => {
+                    // The mesh may have got primitives after the node was made.
+                    let fewest = primitive as usize + 1;
+                    materials.extend(own.iter().take(fewest).skip(materials.len()));
                     let slot =
                         materials.get_mut(primitive as usize).ok_or(EditError::NoPrimitive { primitive })?;
                     let old = std::mem::replace(slot, material);
@@ -199,14 +224,17 @@ impl Document {
 
     fn set_light(&mut self, target: Target, light: Light) -> Result<Edit, EditError> {
         let wanted = "light";
-        let old = self.light_of(target).ok_or(EditError::WrongKind { target, wanted })?;
+        let old = self.light_of(target);
+        if old.is_none() && !(self.restoring && target.part.is_some()) {
+            return Err(EditError::WrongKind { target, wanted });
+        }
         if !light.is_finite() {
             return Err(EditError::NotFinite);
         }
         let inverse = match target.part {
             None => {
                 self.node_mut(target)?.kind = NodeKind::Light(light);
-                Edit::SetLight { target, light: old }
+                Edit::SetLight { target, light: old.unwrap_or(light) }
             }
             Some(_) => match self.change_override(target, |o| o.light = Some(light))?.light {
                 Some(light) => Edit::SetLight { target, light },
@@ -219,14 +247,17 @@ impl Document {
 
     fn set_camera(&mut self, target: Target, camera: Camera) -> Result<Edit, EditError> {
         let wanted = "camera";
-        let old = self.camera_of(target).ok_or(EditError::WrongKind { target, wanted })?;
+        let old = self.camera_of(target);
+        if old.is_none() && !(self.restoring && target.part.is_some()) {
+            return Err(EditError::WrongKind { target, wanted });
+        }
         if !camera.is_finite() {
             return Err(EditError::NotFinite);
         }
         let inverse = match target.part {
             None => {
                 self.node_mut(target)?.kind = NodeKind::Camera(camera);
-                Edit::SetCamera { target, camera: old }
+                Edit::SetCamera { target, camera: old.unwrap_or(camera) }
             }
             Some(_) => {
                 let old = self.change_override(target, |o| o.camera = Some(camera))?;
@@ -279,13 +310,15 @@ impl Document {
         if !value.is_finite() {
             return Err(EditError::NotFinite);
         }
-        for texture_use in value.textures() {
-            if !self.textures.contains_key(&texture_use.texture) {
-                let texture = texture_use.texture.0;
-                return Err(EditError::NoAsset(format!("texture {texture}")));
+        self.require_material(id)?;
+        // One that its prefab has taken along may stay: the rest of the material can still be changed.
+        let known: Vec<TextureId> =
+            self.material(id).iter().flat_map(|m| m.textures()).map(|t| t.texture).collect();
+        for TextureUse { texture, .. } in value.textures() {
+            if !self.textures.contains_key(texture) && !known.contains(texture) && !self.restoring {
+                return Err(EditError::NoAsset(format!("texture {}", texture.0)));
             }
         }
-        self.require_material(id)?;
         let entry = self.materials.entry(id).or_default();
         self.surroundings.note_material(Some(&entry.value), Some(&value));
         let old = std::mem::replace(&mut entry.value, value);
@@ -364,7 +397,7 @@ impl Document {
         self.slots.get_mut(&target.node).map(|slot| &mut slot.node).ok_or(EditError::NoNode(target.node))
     }
 
-    fn report_changed(&mut self, target: Target) {
+    pub(super) fn report_changed(&mut self, target: Target) {
         let content = Content { mesh: true, ..self.content_of(target) };
         self.changes.target_changed(target, content);
         self.note_shine(target);

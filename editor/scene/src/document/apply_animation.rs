@@ -10,11 +10,14 @@ use crate::node::NodeKind;
 impl Document {
     pub(super) fn set_morph_weights(&mut self, target: Target, weights: Vec<f32>) -> Result<Edit, EditError> {
         let wrong_kind = EditError::WrongKind { target, wanted: "mesh with morph targets" };
-        let before = self.shown_weights(target).ok_or(wrong_kind.clone())?;
-        let (wanted, found) = (before.len(), weights.len());
-        let follows_mesh = found == 0 && target.part.is_none();
-        if wanted != found && !follows_mesh {
-            return Err(EditError::WeightCount { wanted, found });
+        let before = self.shown_weights(target);
+        if !self.restoring {
+            let wanted = before.as_ref().ok_or(wrong_kind.clone())?.len();
+            let found = weights.len();
+            let follows_mesh = found == 0 && target.part.is_none();
+            if wanted != found && !follows_mesh {
+                return Err(EditError::WeightCount { wanted, found });
+            }
         }
         if !weights.iter().all(|weight| weight.is_finite()) {
             return Err(EditError::NotFinite);
@@ -31,7 +34,7 @@ impl Document {
                 None => reset(target, OverrideField::Weights),
             },
         };
-        self.report_weights(target, Some(before));
+        self.report_weights(target, before);
         Ok(inverse)
     }
 

@@ -1,12 +1,47 @@
 //! Carries out edits of prefabs: add, remove, and put a new reading of the source in place.
 //! A prefab goes with its meshes, materials and textures.
 
+use std::collections::BTreeSet;
+
 use super::Document;
+use crate::assets::Material;
 use crate::edit::{Edit, EditError, shown};
-use crate::ids::{MaterialId, MeshId, NodeId, PrefabId};
+use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
 use crate::node::NodeKind;
 use crate::package::PrefabPackage;
 use crate::prefab::Prefab;
+
+/// Assets that came, went or changed with a prefab.
+#[derive(Default)]
+struct Brought {
+    meshes: BTreeSet<MeshId>,
+    materials: BTreeSet<MaterialId>,
+    textures: BTreeSet<TextureId>,
+}
+
+impl Brought {
+    fn of(package: &PrefabPackage) -> Self {
+        Self {
+            meshes: package.meshes.iter().map(|(id, _)| *id).collect(),
+            materials: package.materials.iter().map(|(id, _)| *id).collect(),
+            textures: package.textures.iter().map(|(id, _)| *id).collect(),
+        }
+    }
+
+    /// What changes when `other` takes its place: all meshes, but of materials and textures only those that are in one of
+    /// them alone, since the others are told of as changed themselves.
+    fn or_else_of(self, other: Self) -> Self {
+        Self {
+            meshes: self.meshes.union(&other.meshes).copied().collect(),
+            materials: self.materials.symmetric_difference(&other.materials).copied().collect(),
+            textures: self.textures.symmetric_difference(&other.textures).copied().collect(),
+        }
+    }
+
+    fn any_material<'a>(&self, materials: impl IntoIterator<Item = &'a MaterialId>) -> bool {
+        materials.into_iter().any(|id| self.materials.contains(id))
+    }
+}
 
 impl Document {
     pub(super) fn add_prefab(&mut self, package: PrefabPackage) -> Result<Edit, EditError> {
@@ -34,7 +69,9 @@ impl Document {
         if let Some(taken) = taken {
             return Err(EditError::Taken(taken));
         }
+        let brought = Brought::of(&package);
         self.insert_package(package);
+        self.report_users(&brought);
         Ok(Edit::RemovePrefab { prefab: id })
     }
 
@@ -45,6 +82,7 @@ impl Document {
             return Err(EditError::InUse { what, by });
         }
         self.take_package(&package);
+        self.report_users(&Brought::of(&package));
         Ok(Edit::AddPrefab(Box::new(package)))
     }
 
@@ -56,6 +94,7 @@ impl Document {
         for &node in &instances {
             self.report_removed(node);
         }
+        let changed = Brought::of(&old).or_else_of(Brought::of(&package));
         self.take_package(&old);
         self.insert_package(package);
         for node in instances {
@@ -66,7 +105,34 @@ impl Document {
             self.mark_dirty(node);
             self.report_added(node);
         }
+        self.report_users(&changed);
         Ok(Edit::ReplacePrefab(Box::new(old)))
+    }
+
+    /// Marks what uses assets of a prefab without being an instance of it: it may have lost them or have them back.
+    fn report_users(&mut self, brought: &Brought) {
+        let mut targets = Vec::new();
+        for (&id, slot) in &self.slots {
+            match &slot.node.kind {
+                NodeKind::Mesh { mesh, materials, .. } => {
+                    let uses = brought.meshes.contains(mesh) || brought.any_material(materials);
+                    targets.extend(uses.then_some(Target::node(id)));
+                }
+                NodeKind::Prefab { .. } => {
+                    let parts = slot.parts.overrides.iter();
+                    let using = parts.filter(|(_, o)| brought.any_material(o.materials.values()));
+                    targets.extend(using.map(|(&part, _)| Target::part(id, part)));
+                }
+                NodeKind::Group | NodeKind::Light(_) | NodeKind::Camera(_) => {}
+            }
+        }
+        for target in targets {
+            self.report_changed(target);
+        }
+        let textured =
+            |value: &Material| value.textures().any(|used| brought.textures.contains(&used.texture));
+        let materials = self.materials.iter().filter(|(_, entry)| textured(&entry.value));
+        self.changes.materials.extend(materials.map(|(&id, _)| id));
     }
 
     fn insert_package(&mut self, package: PrefabPackage) {

@@ -208,7 +208,7 @@ impl Document {
             NodeKind::Prefab { prefab, .. } if !self.prefabs.contains_key(prefab) => {
                 Err(EditError::NoAsset(format!("prefab {}", prefab.0)))
             }
-            NodeKind::Mesh { mesh, .. } if !self.meshes.contains_key(mesh) => {
+            NodeKind::Mesh { mesh, .. } if !self.meshes.contains_key(mesh) && !self.restoring => {
                 Err(EditError::NoAsset(format!("mesh {}", mesh.0)))
             }
             _ => Ok(()),

@@ -99,7 +99,8 @@ impl Accel {
             // An instance that waited for its BLAS becomes active: its record names a structure now.
             dirty.slots = (0..tables.instances.slot_count()).collect();
         }
-        if !dirty.is_empty() || !self.tlas.exists() {
+        let emptied = self.tlas.built_count() != tables.instances.slot_count();
+        if !dirty.is_empty() || !self.tlas.exists() || emptied {
             let (policy, scratch, groups) = (&self.policy, &mut self.scratch, self.groups);
             let pass = &passes.instance_descriptors;
             self.statistics.tlas =
@@ -124,10 +125,10 @@ impl Accel {
         self.spare_memory(prepared)
     }
 
-    /// What only makes structures better may fail for want of memory: it is tried again after a while.
+    /// Background work may fail for want of memory: the scene stays as it is, and it is tried again after a while.
     fn spare_memory<T: Default>(&mut self, result: Result<T>) -> Result<T> {
         match result {
-            Err(error) if error.is_out_of_memory() && self.blases.waiting.is_empty() => {
+            Err(error) if error.is_out_of_memory() => {
                 tracing::warn!("acceleration structures stay as they are: {error}");
                 self.try_again_at = self.frame + TRY_AGAIN_FRAMES;
                 Ok(T::default())

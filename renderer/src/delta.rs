@@ -80,22 +80,27 @@ pub struct SceneDelta {
 impl SceneDelta {
     /// Whether applying this delta would do nothing.
     pub fn is_empty(&self) -> bool {
-        self.meshes.is_empty()
+        !self.names_more_than_motion()
+            && self.transforms.is_empty()
+            && self.visibility.is_empty()
+            && self.poses.is_empty()
+    }
+
+    /// Whether it holds more than transforms, visibility and poses of instances.
+    pub(crate) fn names_more_than_motion(&self) -> bool {
+        !(self.meshes.is_empty()
             && self.removed_meshes.is_empty()
             && self.textures.is_empty()
             && self.removed_textures.is_empty()
             && self.materials.is_empty()
             && self.removed_materials.is_empty()
             && self.instances.is_empty()
-            && self.transforms.is_empty()
-            && self.visibility.is_empty()
             && self.primitive_transforms.is_empty()
-            && self.poses.is_empty()
             && self.removed_instances.is_empty()
             && self.lights.is_empty()
             && self.removed_lights.is_empty()
             && self.environment.is_none()
-            && !self.render_origin_changed
+            && !self.render_origin_changed)
     }
 }
 
@@ -253,7 +258,7 @@ pub enum Invalidation {
     Nothing,
     /// The camera moved: this view starts again, history is reprojected by motion vectors.
     Camera,
-    /// Size of the view: starts again, history is resampled.
+    /// Size of the view: starts again, history is dropped.
     Resize,
     /// Materials, lights, environment, transforms: all views start again, history is reprojected.
     Scene,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse, Recorder};
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
 use crate::accel::{Accel, AccelPolicy};
 use crate::delta::{InstanceId, Invalidation, MaterialId, SceneDelta};
@@ -103,6 +103,7 @@ impl Renderer {
     pub fn apply(&mut self, recorder: &mut Recorder, delta: &SceneDelta) -> Result<()> {
         self.tables.settle();
         if !delta.is_empty() {
+            let shows = changes_image(delta, &self.tables);
             let applied = self.tables.apply(recorder, delta, &mut self.changed);
             applied.inspect_err(|_| self.changed.all = true)?;
             if changes_needs(delta) || self.summary.emissive_triangles != self.tables.emissive.len() {
@@ -111,7 +112,9 @@ impl Renderer {
             let what =
                 if delta.render_origin_changed { Invalidation::Everything } else { Invalidation::Scene };
             let reason = if delta.reason.is_empty() { "scene" } else { &delta.reason };
-            self.invalidate(what, reason);
+            if shows {
+                self.invalidate(what, reason);
+            }
         }
         let slot = recorder.slot();
         let mut changed = std::mem::take(&mut self.changed);
@@ -344,6 +347,22 @@ impl Renderer {
             (camera.translation.into(), camera.transform_vector3(at.extend(-1.0)).normalize())
         })
     }
+}
+
+/// Whether a delta changes what any ray can meet: hidden instances may move, and others stay where they are.
+fn changes_image(delta: &SceneDelta, tables: &Tables) -> bool {
+    let entry = |id: &InstanceId| tables.instances.slot_of(*id).and_then(|slot| tables.instances.get(slot));
+    let shown = |id: &InstanceId| entry(id).is_none_or(|entry| entry.instance.visibility.shown);
+    let elsewhere = |map: &Affine3A, id: &InstanceId| {
+        entry(id).is_none_or(|entry| entry.instance.render_from_mesh != *map)
+    };
+    delta.names_more_than_motion()
+        || delta.transforms.iter().any(|(id, map)| shown(id) && elsewhere(map, id))
+        || delta.poses.iter().any(|(id, _)| shown(id))
+        || delta
+            .visibility
+            .iter()
+            .any(|(id, v)| entry(id).is_none_or(|entry| entry.instance.visibility != *v))
 }
 
 /// Whether a delta can change what is needed: transforms and poses cannot, but for emitters that lose or get a size.

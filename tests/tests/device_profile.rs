@@ -44,7 +44,7 @@ fn assert_decisions(profile: &Value) {
     }
     let expected = [
         ("refit_pays", figure("blas_refit_ms") < 0.7 * figure("blas_fast_build_ms")),
-        ("tlas_refit_pays", figure("tlas_refit_ms") < 0.7 * figure("tlas_build_ms")),
+        ("refits_tlas", figure("tlas_refit_ms") <= 1.2 * figure("tlas_build_ms")),
         ("compaction_pays", figure("compacted_share") < 0.95),
     ];
     for (decision, pays) in expected {

@@ -256,16 +256,17 @@ impl Later {
     }
 }
 
-/// Takes a structure into use where it still fits: a static one must be of the present geometry, a dynamic one can be
-/// refitted to it when only places of vertices and primitives have changed.
+/// Takes a structure into use where it still fits. When only places of vertices and primitives have changed since, a dynamic
+/// one can be refitted, and where nothing was built before a static one is at least made anew in this frame.
 fn adopt(item: Item, blases: &mut BlasTable, adopted: &mut Adopted) {
     let Some(blas) = blases.get(item.number) else { return };
     let current = blas.version == item.version;
-    let refittable = item.form == Form::Dynamic && blas.content == item.content && blas.built.is_some();
-    if !current && !refittable {
+    let first = blas.built.is_none();
+    let useful = blas.content == item.content && (first || item.form == Form::Dynamic);
+    if !current && !useful {
         return;
     }
-    adopted.appeared |= blas.built.is_none();
+    adopted.appeared |= first;
     adopted.swapped.push(item.number);
     if !current {
         adopted.to_refit.push(item.number);

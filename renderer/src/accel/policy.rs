@@ -15,9 +15,6 @@ pub(crate) const SMALLEST_DISPLACEMENT: f64 = 4.0;
 /// Scenes up to this many slots sort their instances anew at every build of the TLAS; larger ones when an eighth is new.
 pub(crate) const SORTED_SLOTS: u32 = 4096;
 
-/// The TLAS is refitted unless that takes more than this multiple of a build: a refit leaves every instance where it is in
-/// the tree, so that nothing else has to follow.
-const TLAS_REFIT_LIMIT: f64 = 1.2;
 /// Time that a frame of a window may spend on first builds, milliseconds.
 const FRAME_BUILDS_MS: f64 = 8.0;
 
@@ -48,7 +45,7 @@ impl AccelPolicy {
     pub fn of(profile: &DeviceProfile, window: bool) -> Self {
         Self {
             refit: profile.refit_pays(),
-            refit_tlas: profile.tlas_refit_ms <= TLAS_REFIT_LIMIT * profile.tlas_build_ms,
+            refit_tlas: profile.refits_tlas(),
             compact: profile.compaction_pays(),
             frame_triangles: window.then(|| profile.triangles_in(FRAME_BUILDS_MS)),
             wait: !window,

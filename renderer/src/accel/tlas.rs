@@ -13,7 +13,7 @@ use glam::{DVec3, Vec3};
 use super::blas::BlasTable;
 use super::build::Scratch;
 use super::order::{Displacement, Places};
-use super::policy::AccelPolicy;
+use super::policy::{AccelPolicy, SORTED_SLOTS};
 use crate::delta::Visibility;
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{MASK_CAMERA, MASK_INDIRECT, MASK_SHADOWS, RAY_SHAPES, Rows, TLAS_NO_BLAS, TlasSlot};
@@ -87,6 +87,11 @@ impl Tlas {
         }
     }
 
+    /// Number of slots at the last build.
+    pub(crate) fn built_count(&self) -> u32 {
+        self.built_count
+    }
+
     pub(crate) fn exists(&self) -> bool {
         self.structure.is_some()
     }
@@ -117,7 +122,7 @@ impl Tlas {
         }
         let loose = self.displacement.demands_build(tables.instances.len());
         // Sorted places are those of another tree, and what has taken a slot does not stand where its last owner stood.
-        let sorts = self.places.wants_sorting() || (loose && !policy.refit_tlas);
+        let sorts = self.places.wants_sorting() || (loose && (count <= SORTED_SLOTS || !policy.refit));
         let rebuild = sorts || dirty.reused > 0 || loose || !policy.refit_tlas;
         if sorts {
             self.sort(tables);

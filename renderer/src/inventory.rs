@@ -59,7 +59,7 @@ pub struct InstanceEntry {
 pub struct MeshEntry {
     /// Geometry records, addresses taken out.
     pub geometries: Vec<gpu_types::Geometry>,
-    /// Digest of positions, attributes and indices.
+    /// Digest of positions, attributes and indices, or of shapes and their boxes.
     pub vertices: u64,
 }
 

@@ -2,11 +2,16 @@
 //! a scene with and without what cannot be seen.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
+use std::collections::BTreeSet;
+
 use caustica_renderer::delta::{Geometry, Instance, InstanceId, SceneDelta, Visibility};
 use caustica_renderer::{Accumulated, NeedsMode, Pipeline, ViewSettings};
-use caustica_tests::scene::{Scene, camera_parallel, glass, lambert, point_light, quad, sphere, zoo};
+use caustica_tests::numbers::Random;
+use caustica_tests::scene::{
+    Scene, camera_at, camera_parallel, cube, glass, lambert, point_light, quad, sphere, zoo,
+};
 use caustica_tests::studio::Studio;
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Quat, Vec3, Vec3A};
 
 const EXTENT: [u32; 2] = [96, 64];
 
@@ -104,12 +109,15 @@ fn parts_of_a_sample_set_add_up_to_the_whole() {
     }
 }
 
-/// What cannot be seen: hidden, without size, not a number, infinite.
-fn unseen() -> [(&'static str, bool, Affine3A); 4] {
+/// What cannot be seen: hidden, without size, singular, not a number, infinite.
+fn unseen() -> [(&'static str, bool, Affine3A); 6] {
+    let (x, z) = (Vec3A::new(0.3, 0.4, 0.0), Vec3A::Z);
     [
         ("hidden", false, in_front()),
         ("without size", true, Affine3A::from_scale(Vec3::ZERO)),
+        ("two axes alike", true, Affine3A::from_cols(x, x, z, in_front().translation)),
         ("not a number", true, Affine3A::from_translation(Vec3::new(f32::NAN, 0.0, 0.0))),
+        ("turned by what is no number", true, Affine3A::from_cols(x, Vec3A::new(0.0, f32::NAN, 1.0), z, x)),
         ("infinite", true, Affine3A::from_scale(Vec3::new(1.0, f32::INFINITY, 1.0))),
     ]
 }
@@ -154,6 +162,70 @@ fn what_cannot_be_seen_changes_nothing_else() {
         }
         studio.apply(&with(true, in_front()));
         assert_eq!(differing(&shown, &studio.mean(3), 1e-6), 0, "and back, {}", pipeline.name());
+    }
+}
+
+/// The first, the last and one in the middle of the instances that the camera sees.
+fn seen_of(studio: &mut Studio, ids: &[InstanceId]) -> [InstanceId; 3] {
+    let mut seen: BTreeSet<InstanceId> = BTreeSet::new();
+    for pixel in (0..EXTENT[0]).step_by(5).flat_map(|x| (0..EXTENT[1]).step_by(5).map(move |y| [x, y])) {
+        let hit = studio.renderer.pick(&mut studio.session.frames, studio.view, pixel).expect("a pick");
+        seen.extend(hit.map(|hit| hit.instance));
+    }
+    let seen: Vec<InstanceId> = ids.iter().copied().filter(|id| seen.contains(id)).collect();
+    assert!(seen.len() > 50, "{} are seen", seen.len());
+    [seen[0], seen[seen.len() / 2], seen[seen.len() - 1]]
+}
+
+#[test]
+fn a_spoilt_instance_of_two_hundred_takes_no_other_with_it() {
+    let mut random = Random::new(200);
+    let mut scene = Scene::new();
+    let (mesh, material) = (scene.mesh(cube(1.0)), scene.material(lambert(0.6)));
+    let mut number = |low: f64, high: f64| random.between(low, high) as f32;
+    let ids: Vec<InstanceId> = (0..200)
+        .map(|_| {
+            let scale = Vec3::new(number(0.1, 0.4), number(0.1, 0.4), number(0.1, 0.4));
+            let turn = Quat::from_rotation_y(number(0.0, 6.0)) * Quat::from_rotation_x(number(0.0, 6.0));
+            let at = Vec3::new(number(-2.4, 2.4), number(0.0, 2.2), number(-2.0, 2.0));
+            scene.place(mesh, material, Affine3A::from_scale_rotation_translation(scale, turn, at))
+        })
+        .collect();
+    scene.light(point_light(Vec3::new(1.0, 4.0, 3.0), 15.0));
+    scene.surround(0.1);
+    let camera = camera_at(Vec3::new(0.2, 1.6, 5.0), Vec3::new(0.0, 1.0, 0.0), 0.7);
+    for pipeline in Pipeline::ALL {
+        let still = ViewSettings { temporal: false, ..settings(pipeline) };
+        let mut studio = Studio::of(EXTENT, still, &scene.delta, camera);
+        let whole = studio.mean(2);
+        for id in seen_of(&mut studio, &ids) {
+            let (_, instance) = scene.delta.instances.iter().find(|(other, _)| *other == id).expect("a box");
+            let without = SceneDelta { removed_instances: vec![id], ..SceneDelta::default() };
+            studio.apply(&without);
+            let without = studio.mean(2);
+            assert!(differing(&whole, &without, 0.1) > 0, "it is seen");
+            studio.apply(&SceneDelta { instances: vec![(id, instance.clone())], ..SceneDelta::default() });
+            for (name, shown, place) in unseen() {
+                // As a move alone, and as a whole instance.
+                let visibility = Visibility { shown, ..Visibility::default() };
+                let moved = SceneDelta {
+                    transforms: vec![(id, place)],
+                    visibility: vec![(id, visibility)],
+                    ..SceneDelta::default()
+                };
+                let changed = Instance { render_from_mesh: place, visibility, ..instance.clone() };
+                let sent = SceneDelta { instances: vec![(id, changed)], ..SceneDelta::default() };
+                for delta in [moved, sent] {
+                    studio.apply(&delta);
+                    assert_eq!(bits(&studio.mean(2)), bits(&without), "{name}, {}", pipeline.name());
+                    studio.apply(&SceneDelta {
+                        instances: vec![(id, instance.clone())],
+                        ..SceneDelta::default()
+                    });
+                }
+            }
+            assert_eq!(bits(&studio.mean(2)), bits(&whole), "and back, {}", pipeline.name());
+        }
     }
 }
 

@@ -45,7 +45,7 @@ pub(crate) struct GpuMesh {
 
 /// Everything that a mesh, or an instance that deforms, has on the device.
 pub(crate) struct MeshBuffers<'a> {
-    /// Positions, attributes and, where they are its own, indices.
+    /// Positions, attributes and, where they are its own, indices; or shapes and their boxes.
     pub(crate) vertices: Vec<&'a Buffer>,
     /// Geometry records.
     pub(crate) geometries: &'a Buffer,
@@ -55,7 +55,11 @@ impl GpuMesh {
     /// Its buffers, to be read back.
     pub(crate) fn buffers(&self) -> MeshBuffers<'_> {
         let Vertices { positions, attributes, indices } = self.vertices.as_ref();
-        MeshBuffers { vertices: vec![positions, attributes, indices], geometries: &self.geometries }
+        let vertices = match &self.shapes {
+            Some(shapes) => shapes.buffers().to_vec(),
+            None => vec![positions, attributes, indices],
+        };
+        MeshBuffers { vertices, geometries: &self.geometries }
     }
 
     /// Address of the geometry records.

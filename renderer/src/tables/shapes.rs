@@ -47,6 +47,11 @@ impl ShapeBuffers {
         self.records.address() + u64::from(geometry.first_index) * size_of::<Shape>() as u64
     }
 
+    /// Records and boxes, to be read back.
+    pub(super) fn buffers(&self) -> [&Buffer; 2] {
+        [&self.records, &self.boxes]
+    }
+
     fn boxes_address(&self, geometry: &delta::Geometry) -> u64 {
         self.boxes.address() + u64::from(geometry.first_index) * size_of::<ShapeBox>() as u64
     }

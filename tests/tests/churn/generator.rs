@@ -1,7 +1,7 @@
 //! Random steps on a session: the same seed makes the same steps. Every kind of edit is among them, and so are undo, redo,
 //! gestures that are given up, times of an animation, and edits that must be refused.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use caustica::session::Session;
 use caustica_scene::import::Imported;
@@ -12,6 +12,8 @@ use caustica_scene::{
 };
 use caustica_tests::numbers::Random;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3, Vec4};
+
+use crate::targets::{removal, targets_of};
 
 /// Most nodes of the document, about.
 const MOST_NODES: usize = 56;
@@ -260,7 +262,7 @@ impl Churn {
             "import" => return None,
             "remove prefab" if prefabs.len() > 1 => {
                 let prefab = self.pick(&prefabs)?;
-                self.removal(document, prefab)?
+                removal(document, prefab)?
             }
             "remove prefab" => Edit::RemovePrefab { prefab: self.pick(&prefabs)? },
             "add material" => {
@@ -273,39 +275,6 @@ impl Churn {
                 Edit::RemoveMaterial { material: self.pick(&own)? }
             }
         })
-    }
-
-    /// A prefab goes, and with it all that uses it: not at all when that is much.
-    fn removal(&self, document: &Document, prefab: PrefabId) -> Option<Edit> {
-        let brought = document.prefab(prefab)?;
-        let uses = |target: Target| {
-            let node = document.node(target.node).and_then(Node::prefab) == Some(prefab);
-            let mesh = document.mesh_of(target).is_some_and(|mesh| brought.meshes.contains(&mesh));
-            let placed = document.renderable(target);
-            let own = placed.is_some_and(|p| p.materials.iter().any(|id| brought.materials.contains(id)));
-            let kept = document.part_override(target);
-            let kept = kept.is_some_and(|o| o.materials.values().any(|id| brought.materials.contains(id)));
-            node || mesh || own || kept
-        };
-        let mut gone = BTreeSet::new();
-        let mut edits = Vec::new();
-        for target in targets_of(document).into_iter().filter(|target| uses(*target)) {
-            if !gone.contains(&target.node) {
-                gone.extend(document.subtree_ids(target.node));
-                edits.push(Edit::RemoveNode { node: target.node });
-            }
-        }
-        // What hangs below another one that goes has gone with it.
-        let top = |edit: &Edit| match edit {
-            Edit::RemoveNode { node } => {
-                let above = document.node(*node).and_then(|node| node.parent);
-                above.is_none_or(|above| !gone.contains(&above))
-            }
-            _ => true,
-        };
-        edits.retain(top);
-        edits.push(Edit::RemovePrefab { prefab });
-        (gone.len() < 20).then(|| Edit::batch("removed a prefab with what uses it", edits))
     }
 
     fn value_edit(&mut self, document: &mut Document, kind: &str) -> Option<Edit> {
@@ -487,16 +456,4 @@ impl Churn {
         };
         DAffine3::from_scale_rotation_translation(scale, self.rotation(), translation)
     }
-}
-
-/// Nodes and parts.
-fn targets_of(document: &Document) -> Vec<Target> {
-    let mut targets = Vec::new();
-    for (id, node) in document.nodes() {
-        targets.push(Target::node(id));
-        let prefab = node.prefab().and_then(|id| document.prefab(id));
-        let parts = prefab.map_or(0, |prefab| prefab.nodes().len() as u32);
-        targets.extend((0..parts).map(|part| Target::part(id, part)));
-    }
-    targets
 }

@@ -58,6 +58,16 @@ pub enum RendererError {
         /// What is wrong with them.
         reason: String,
     },
+    /// An instance has not one material for each geometry of its mesh.
+    #[error("an instance has {found} materials, its mesh {mesh} has {geometry_count} primitives")]
+    Materials {
+        /// Id of the mesh.
+        mesh: u64,
+        /// Number of materials.
+        found: usize,
+        /// Number of geometries.
+        geometry_count: u32,
+    },
     /// An id that is not in the tables.
     #[error("{what} {id} is not in the scene")]
     Unknown {

@@ -1,10 +1,31 @@
 //! When acceleration structures are built, refitted, rebuilt, compacted and swapped, counted row by row of the design's table;
 //! and that the picture is that of a fresh scene after each.
+//!
+//! | row of the table | tests here, in `invalidation.rs` (i), `deform.rs` (d) and `churn/rows.rs` (r, through a session) |
+//! |---|---|
+//! | move, rotate, scale | `a_moved_instance_is_right_in_the_next_frame` (i), `a_tree_whose_instances_have_moved_far_is_built_anew`, `what_moves_or_hides_costs_its_records_and_a_refit` (r) |
+//! | hide; an active state | `hiding_is_a_mask_and_a_refit`, `hiding_and_degenerating_come_back_unharmed` (i) |
+//! | move a primitive | `a_moved_primitive_is_right_in_the_next_frame_and_refitted_from_then_on`, `where_a_refit_does_not_pay_a_moved_primitive_is_built_in_place` |
+//! | morph, skin | `a_pose_uploads_its_joints_and_refits_one_tree` (d), `a_primitive_a_weight_and_a_joint_cost_the_trees_that_they_bend` (r) |
+//! | quality decays | `what_refits_have_loosened_is_rebuilt_in_the_background_and_swapped_without_a_reset`, `an_edit_while_the_background_builds_is_not_lost` |
+//! | add, remove a node | `adding_builds_what_is_new_only_and_removing_nothing` (i), `who_takes_anothers_slot_has_the_tree_built_anew`, `first_builds_past_the_budget_come_later_while_frames_go_on` |
+//! | add, remove a prefab | `an_instance_builds_what_it_does_not_share_and_its_end_builds_nothing` (r) |
+//! | material; a flip of opacity | `material_and_light_edits_build_nothing` (i), `a_material_that_lets_light_through_takes_another_blas_and_no_other_is_touched` |
+//! | light, environment | `lights_and_environment_touch_no_structure`, `materials_lights_and_surroundings_cost_their_records` (r) |
+//! | time step | `a_time_step_costs_what_the_clip_moves_and_bends` (r), `history_is_reprojected_by_moves_and_dropped_with_everything` (r) |
+//! | camera | `moving_one_camera_resets_that_view_alone` (i), `views_cost_no_structure` (r) |
+//! | render origin | `views_cost_no_structure` (r): all instances have moved far, so that the TLAS is built instead of refitted |
+//! | pipeline, quality | `every_other_event_resets_and_says_why` (i), `views_cost_no_structure` (r) |
+//! | shader reloaded | none: shaders are read when a pipeline is made |
+//! | size of the view | `every_other_event_resets_and_says_why` (i), `views_cost_no_structure` (r) |
+//! | needs | `what_only_changes_the_display_keeps_the_samples` (i), `what_is_no_event_keeps_the_samples` (r) |
+//! | compacted, rebuilt in the background | `an_edited_mesh_that_rests_is_built_to_be_traced_fast_and_compacted`, `what_was_begun_for_another_mesh_is_dropped` |
+//! | exposure, tone map, overlay, selection, window move | `what_only_changes_the_display_keeps_the_samples` (i), `what_is_no_event_keeps_the_samples` (r), `idle_frames_do_nothing_at_all` |
 
 use std::sync::Arc;
 
 use caustica_renderer::delta::{
-    Camera, InstanceId, Light, Material, Mesh, MeshId, SceneDelta, ShadingMode, Visibility,
+    Camera, Instance, InstanceId, Light, Material, Mesh, MeshId, SceneDelta, ShadingMode, Visibility,
 };
 use caustica_renderer::{AccelPolicy, AccelStatistics, Accumulated, Pipeline, TlasWork, ViewSettings};
 use caustica_tests::scene::{Scene, camera_at, cube, lambert, mirror, point_light, quad, sphere};
@@ -184,6 +205,49 @@ fn an_edit_while_the_background_builds_is_not_lost() {
 }
 
 #[test]
+fn what_was_begun_for_another_mesh_is_dropped() {
+    let room = room();
+    let policy = AccelPolicy { compact: false, wait: false, ..AccelPolicy::default() };
+    let mut studio = studio_of(&room, policy);
+    studio.frames(1);
+    studio.frame(&slid(room.mesh, 0.0));
+    // Loosened here, and so begun in the background; in the next frame the mesh has other triangles.
+    studio.frame(&slid(room.mesh, 2.5));
+    let mut other = pair();
+    other.indices.truncate(other.indices.len() - 24);
+    other.geometries[1].index_count -= 24;
+    other.geometries[1].mesh_from_primitive = shift(0.5);
+    let other = Arc::new(other);
+    let replaced = SceneDelta {
+        meshes: vec![(room.mesh, Arc::clone(&other))],
+        reason: String::from("replaced"),
+        ..SceneDelta::default()
+    };
+    studio.frame(&replaced);
+    assert_eq!(work(&studio).0, 1);
+    let mut frames = 0;
+    while studio.renderer.is_busy() {
+        studio.frames(1);
+        frames += 1;
+        assert!(frames < 200, "the background never ends");
+    }
+    let found = studio.read();
+    assert_eq!(studio.statistics().acceleration.total_blas_swapped, 0, "it is of another mesh");
+    drop(studio);
+    let mut fresh = room;
+    fresh
+        .scene
+        .delta
+        .meshes
+        .iter_mut()
+        .filter(|(id, _)| *id == fresh.mesh)
+        .for_each(|(_, m)| *m = Arc::clone(&other));
+    let mut fresh = studio_of(&fresh, AccelPolicy::default());
+    let expected = fresh.mean(frames + 1);
+    assert!(largest_difference(&found, &expected) < 1e-5);
+}
+
+#[test]
 fn an_edited_mesh_that_rests_is_built_to_be_traced_fast_and_compacted() {
     let room = room();
     let mut studio = studio_of(&room, AccelPolicy::default());
@@ -257,6 +321,71 @@ fn first_builds_past_the_budget_come_later_while_frames_go_on() {
     }
 }
 
+/// A row of boxes, one metre apart.
+fn row() -> (Scene, Vec<InstanceId>, Camera) {
+    let mut scene = Scene::new();
+    let (mesh, material) = (scene.mesh(cube(0.6)), scene.material(lambert(0.5)));
+    let boxes = (0..12).map(|i| scene.place(mesh, material, in_row(i))).collect();
+    scene.light(point_light(Vec3::new(0.0, 4.0, 6.0), 30.0));
+    (scene, boxes, camera_at(Vec3::new(0.0, 2.0, 14.0), Vec3::ZERO, 0.7))
+}
+
+fn in_row(place: u8) -> Affine3A {
+    Affine3A::from_translation(Vec3::X * (f32::from(place) - 5.5))
+}
+
+#[test]
+fn a_tree_whose_instances_have_moved_far_is_built_anew() {
+    let (scene, boxes, camera) = row();
+    let mut studio = Studio::of(EXTENT, hybrid(), &scene.delta, camera);
+    studio.frames(3);
+    let moved = |by: u8| SceneDelta {
+        transforms: (0..12).zip(&boxes).map(|(i, id)| (*id, in_row((i + by) % 12))).collect(),
+        ..SceneDelta::default()
+    };
+    studio.frame(&SceneDelta { transforms: vec![(boxes[0], in_row(11))], ..SceneDelta::default() });
+    assert_eq!(work(&studio), (0, 0, TlasWork::Refit), "one of twelve");
+    studio.frame(&moved(6));
+    assert_eq!(work(&studio), (0, 0, TlasWork::Built), "all of them, by half of the row");
+    let after = studio.read();
+    studio.frame(&moved(7));
+    assert_eq!(work(&studio), (0, 0, TlasWork::Refit), "counted from the last build");
+    drop(studio);
+    let mut fresh = scene;
+    fresh
+        .delta
+        .instances
+        .iter_mut()
+        .zip(0..)
+        .for_each(|((_, box_), i)| box_.render_from_mesh = in_row((i + 6) % 12));
+    let expected = Studio::of(EXTENT, hybrid(), &fresh.delta, camera).mean(1);
+    assert!(largest_difference(&after, &expected) < 1e-6);
+}
+
+#[test]
+fn who_takes_anothers_slot_has_the_tree_built_anew() {
+    let (scene, boxes, camera) = row();
+    let mut studio = Studio::of(EXTENT, hybrid(), &scene.delta, camera);
+    studio.frames(3);
+    // The same mesh, the same number of instances, the same active states: only nothing stands where it stood.
+    let (_, first) = scene.delta.instances[0].clone();
+    let render_from_mesh = Affine3A::from_translation(Vec3::new(2.0, 2.0, 1.0));
+    let added = (InstanceId { node: 900, part: 0 }, Instance { render_from_mesh, ..first });
+    studio.frame(&SceneDelta {
+        removed_instances: vec![boxes[0]],
+        instances: vec![added.clone()],
+        ..SceneDelta::default()
+    });
+    assert_eq!(work(&studio), (0, 0, TlasWork::Built));
+    let after = studio.read();
+    drop(studio);
+    let mut fresh = scene;
+    fresh.delta.instances.remove(0);
+    fresh.delta.instances.push(added);
+    let expected = Studio::of(EXTENT, hybrid(), &fresh.delta, camera).mean(1);
+    assert!(largest_difference(&after, &expected) < 1e-6);
+}
+
 #[test]
 fn hiding_is_a_mask_and_a_refit() {
     let room = room();
@@ -319,7 +448,7 @@ fn a_material_that_lets_light_through_takes_another_blas_and_no_other_is_touched
     assert_eq!(work(&studio), (0, 0, TlasWork::Kept), "a colour is no geometry");
     let glass = Material { mode: ShadingMode::Refractive, ior: 1.5, ..Material::default() };
     studio.frame(&change(glass.clone()));
-    assert_eq!(work(&studio).0, 1);
+    assert_eq!(work(&studio), (1, 0, TlasWork::Refit), "no instance has come, gone or moved");
     assert_eq!(studio.statistics().acceleration.blas_count, 4, "the old one is dropped");
     studio.frame(&change(Material { ior: 1.3, ..glass }));
     assert_eq!(work(&studio), (0, 0, TlasWork::Kept));

@@ -2,9 +2,13 @@
 //! of the design says so, and every reset has its reason.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
-use caustica_renderer::delta::{Camera, InstanceId, Light, Material, SceneDelta};
+use std::sync::Arc;
+
+use caustica_renderer::delta::{Camera, Geometry, Instance, InstanceId, Light, Material, SceneDelta};
 use caustica_renderer::{Accumulated, NeedsMode, Pipeline, Show, TlasWork, ToneMap, ViewSettings};
-use caustica_tests::scene::{Scene, camera_at, cube, lambert, mirror, point_light, quad, sphere};
+use caustica_tests::scene::{
+    Scene, camera_at, checker, cube, lambert, mirror, plain_use, point_light, quad, sphere,
+};
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec3};
 
@@ -232,6 +236,86 @@ fn material_and_light_edits_build_nothing() {
     assert_eq!((figures.acceleration.tlas, figures.acceleration.blas_built), (TlasWork::Kept, 0));
     assert_eq!(figures.reset_reason, "changed Ball");
     assert!(largest_difference(&before, &studio.read()) > 0.05);
+}
+
+#[test]
+fn a_texture_is_replaced_under_materials_that_are_not_sent_again() {
+    let (mut scene, _, camera) = room(0.0, 0.0);
+    let (old, new) = (checker(4, 0, 60), checker(6, 200, 255));
+    let texture = scene.texture(old);
+    let painted = Material { base_color_texture: Some(plain_use(texture)), ..lambert(1.0) };
+    scene.delta.materials[0].1 = painted;
+    let mut studio = Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, camera);
+    // At rest, compacted too.
+    let before = studio.mean(8);
+    let replaced = SceneDelta { textures: vec![(texture, Arc::new(new.clone()))], ..SceneDelta::default() };
+    studio.frame(&replaced);
+    assert_eq!(studio.statistics().acceleration.tlas, TlasWork::Kept);
+    let after = studio.read();
+    drop(studio);
+    for (_, known) in &mut scene.delta.textures {
+        *known = Arc::new(new.clone());
+    }
+    let expected = Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, camera).mean(1);
+    assert!(largest_difference(&before, &after) > 0.2);
+    assert!(largest_difference(&after, &expected) < 1e-6);
+}
+
+#[test]
+fn an_emitter_that_gets_a_size_shines_and_one_that_loses_it_does_not() {
+    let (mut scene, _, camera) = room(0.0, 0.0);
+    scene.delta.lights.clear();
+    let panel = Material { emissive: Vec3::splat(20.0), ..lambert(0.0) };
+    let up = Affine3A::from_translation(Vec3::new(0.0, 2.5, 0.5))
+        * Affine3A::from_rotation_x(std::f32::consts::FRAC_PI_2);
+    let lamp = scene.put(quad(0.8, 0.8), panel, up);
+    let image = |scene: &Scene| Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, camera).mean(8);
+    let lit = image(&scene);
+    let place = |scene: &mut Scene, map| {
+        for (id, instance) in &mut scene.delta.instances {
+            if *id == lamp {
+                instance.render_from_mesh = map;
+            }
+        }
+    };
+    let none = Affine3A::from_scale(Vec3::ZERO);
+    place(&mut scene, none);
+    let dark = image(&scene);
+    assert!(largest_difference(&lit, &dark) > 0.1);
+    // What the scene needs is decided anew by a move alone.
+    let mut studio = Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, camera);
+    studio.frames(2);
+    let left_out = |studio: &Studio| {
+        studio.statistics().left_out.iter().any(|left| left.what == "emissive triangles as lights")
+    };
+    assert!(left_out(&studio));
+    for (map, expected) in [(up, &lit), (none, &dark), (up, &lit)] {
+        studio.frame(&SceneDelta { transforms: vec![(lamp, map)], ..SceneDelta::default() });
+        assert_eq!(left_out(&studio), map == none);
+        assert!(largest_difference(&studio.mean(8), expected) < 1e-5);
+    }
+}
+
+#[test]
+fn a_mesh_that_does_not_fit_its_instances_is_refused_until_they_follow() {
+    let (scene, ball, camera) = room(0.0, 0.0);
+    let (_, instance) = scene.delta.instances.iter().find(|(id, _)| *id == ball).expect("the ball").clone();
+    let mut studio = Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, camera);
+    studio.frames(2);
+    let mut halves = cube(1.0);
+    let half = halves.geometries[0].index_count / 2;
+    halves.geometries[0].index_count = half;
+    halves.geometries.push(Geometry { first_index: half, ..halves.geometries[0] });
+    let meshes = vec![(instance.mesh, Arc::new(halves))];
+    let alone = SceneDelta { meshes: meshes.clone(), ..SceneDelta::default() };
+    let mut recorder = studio.session.frames.begin().expect("a frame");
+    let refused = studio.renderer.apply(&mut recorder, &alone).expect_err("two primitives, one material");
+    studio.session.frames.submit(recorder, None).expect("a submission");
+    assert!(refused.to_string().contains("an instance has 1 materials, its mesh"), "{refused}");
+    let followed = Instance { materials: vec![instance.materials[0]; 2], ..instance };
+    studio.frame(&SceneDelta { meshes, instances: vec![(ball, followed)], ..SceneDelta::default() });
+    assert_eq!(studio.statistics().acceleration.blas_count, 3);
+    assert!(studio.mean(2).mean.iter().flatten().all(|x| x.is_finite()));
 }
 
 #[test]

@@ -286,11 +286,11 @@ impl Instances {
 
 /// An instance has one material for each geometry of its mesh.
 fn check_materials(instance: &Instance, geometry_count: u32) -> Result<()> {
-    let (asked, limit) = (instance.materials.len() as u64, u64::from(geometry_count));
-    if asked == limit {
+    let found = instance.materials.len();
+    if found == geometry_count as usize {
         return Ok(());
     }
-    Err(RendererError::Limit { what: String::from("materials of an instance"), asked, limit })
+    Err(RendererError::Materials { mesh: instance.mesh.0, found, geometry_count })
 }
 
 /// Fills in what follows from the transform.

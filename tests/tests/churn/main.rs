@@ -9,6 +9,7 @@ mod faults;
 mod generator;
 mod images;
 mod model;
+mod rows;
 mod targets;
 
 use std::path::Path;

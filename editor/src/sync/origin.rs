@@ -129,6 +129,8 @@ fn discount(counts: &mut BTreeMap<i32, usize>, key: i32) {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test may panic")]
+
     use super::*;
     use caustica_scene::{Edit, Local, Node, NodeId, NodeKind, Trs};
 

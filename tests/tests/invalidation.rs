@@ -407,7 +407,7 @@ fn a_spoilt_light_leaves_no_trace_in_motion() {
         studio.frames(2);
         let mut counted = 0;
         for step in 0..7_u8 {
-            let mut delta = moved(ball, -0.6 + 0.1 * f32::from(step));
+            let mut delta = moved(ball, -0.55 + 0.1 * f32::from(step));
             match step {
                 0 if spoil => delta.lights.push((lamp, absurd)),
                 1 if spoil => delta.removed_lights.push(lamp),

@@ -3,6 +3,7 @@
 //! It knows no hierarchy and no file format. Lengths are metres in render space
 //! (world space less the render origin, which the caller subtracts in double precision).
 
+mod lobes;
 mod material;
 mod mesh;
 
@@ -10,6 +11,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
 
+pub use lobes::Lobes;
 pub use material::{AlphaMode, Material, Sampler, ShadingMode, Texture, TextureUse, Wrap};
 pub use mesh::{Deformation, Geometry, Mesh, MorphTarget, Pose, Shape, ShapeKind};
 

@@ -21,7 +21,7 @@ pub use accel::AccelPolicy;
 pub use accumulation::{Accumulation, BLOCK_SAMPLES, Sample};
 pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
-pub use inventory::{EnvironmentEntry, InstanceEntry, Inventory, Layout, MeshEntry, Place};
+pub use inventory::{EnvironmentEntry, InstanceEntry, Inventory, Layout, MaterialEntry, MeshEntry, Place};
 pub use measure::{
     AccelBench, AccelStatistics, BlasTimes, DeviceProfile, LeftOut, ProfileInForce, Statistics, TlasTimes,
     TlasWork,
@@ -29,4 +29,5 @@ pub use measure::{
 pub use needs::{Needs, SceneSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
 pub use settings::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+pub use tables::sheen_albedo_table;
 pub use view::{View, ViewId};

@@ -29,7 +29,7 @@ pub struct SceneSummary {
     pub emission: bool,
     /// Some material mirrors.
     pub mirrors: bool,
-    /// The smallest roughness of a PBR material, in thousandths; textured roughness counts as 0.
+    /// The smallest roughness of a PBR material, in thousandths; textured roughness and glossiness count as 0.
     pub min_roughness_permille: u32,
     /// Some surface lets light pass.
     pub transmission: bool,
@@ -39,19 +39,15 @@ pub struct SceneSummary {
     pub any_hit: bool,
     /// Some mesh holds spheres or boxes.
     pub shapes: bool,
+    /// Some material has lobes beside metallic-roughness, or textures of specular or transmission.
+    pub lobes: bool,
 }
 
 impl SceneSummary {
     /// Adds what a material in use brings.
     pub(crate) fn add_material(&mut self, material: &Material) {
-        let textures = [
-            &material.base_color_texture,
-            &material.metallic_roughness_texture,
-            &material.normal_texture,
-            &material.occlusion_texture,
-            &material.emissive_texture,
-        ];
-        self.textures |= textures.iter().any(|texture| texture.is_some());
+        self.textures |= material.textures().next().is_some();
+        self.lobes |= material.lobes.as_ref().is_some_and(|lobes| !lobes.is_plain());
         self.normal_maps |= material.normal_texture.is_some();
         self.emission |= emits(material) || material.mode == ShadingMode::Unlit;
         self.mirrors |= material.mode == ShadingMode::Reflective;
@@ -59,7 +55,8 @@ impl SceneSummary {
         self.alpha |= has_alpha(material);
         self.any_hit |= !is_opaque(material);
         if material.mode == ShadingMode::Pbr {
-            let textured = material.metallic_roughness_texture.is_some();
+            let glossy = material.lobes.as_ref().is_some_and(|lobes| lobes.glossiness.is_some());
+            let textured = material.metallic_roughness_texture.is_some() || glossy;
             let roughness = if textured { 0.0 } else { material.roughness.clamp(0.0, 1.0) };
             self.min_roughness_permille = self.min_roughness_permille.min((roughness * 1000.0) as u32);
         }
@@ -106,6 +103,8 @@ pub struct Needs {
     pub shapes: bool,
     /// Rays find the primary surfaces, not the rasteriser.
     pub primary_rays: bool,
+    /// Lobes of materials beside metallic-roughness, and textures of specular and transmission.
+    pub lobes: bool,
 }
 
 impl Needs {
@@ -137,6 +136,7 @@ impl Needs {
             motion: all || settings.show == Show::Motion || (settings.temporal && rays && noisy),
             shapes: rays && (all || scene.shapes),
             primary_rays: settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
+            lobes: all || scene.lobes,
         }
     }
 
@@ -165,6 +165,7 @@ impl Needs {
             self.shadow_rays,
             self.motion,
             self.shapes,
+            self.lobes,
         ];
         Specialization {
             values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),
@@ -184,7 +185,7 @@ impl Needs {
                 nothing
             }
         };
-        let list: [(bool, &str, &str); 15] = [
+        let list: [(bool, &str, &str); 16] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -196,6 +197,11 @@ impl Needs {
             (self.environment_map || !self.environment, "environment map", "the environment is a constant"),
             (self.textures, "texture look-ups", "no material has a texture"),
             (self.normal_maps, "normal mapping", "no material has a normal map"),
+            (
+                self.lobes,
+                "coats, sheen, films and other lobes",
+                "every material is plain metallic-roughness",
+            ),
             (
                 rays && self.reflection,
                 "reflection rays",

@@ -10,9 +10,11 @@ mod emissive;
 mod environment;
 mod instances;
 mod lights;
+mod lobes;
 mod materials;
 mod meshes;
 mod shapes;
+mod sheen;
 mod snapshot;
 mod spatial_order;
 mod table;
@@ -27,6 +29,7 @@ pub(crate) use draws::Batch;
 pub(crate) use instances::{Instances, Slot};
 pub(crate) use materials::{Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits};
 pub(crate) use meshes::{MeshBuffers, Meshes, rows_of};
+pub use sheen::albedo_table as sheen_albedo_table;
 pub(crate) use snapshot::Snapshot;
 pub(crate) use spatial_order::order_of;
 pub(crate) use table::{Download, Table};
@@ -206,6 +209,8 @@ impl Tables {
             emissive_alias: self.emissive.alias_address(),
             environment_alias: self.environment.alias_address(),
             draw_instances: self.draws.address(),
+            material_lobes: self.materials.lobes_address(),
+            sheen_albedo: self.materials.sheen_albedo_address(),
             light_count: self.lights.len(),
             emissive_count: self.emissive.len(),
             environment_width,

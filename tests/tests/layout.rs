@@ -208,7 +208,7 @@ fn constants_are_the_same_on_both_sides() {
         device.extend(constants(&shader_text(&file), "const uint ", "="));
     }
     assert!(device.len() > 30, "only {} constants were found", device.len());
-    for beginning in ["MASK_", "GEOMETRY_", "TLAS_", "RAY_", "SHOW_"] {
+    for beginning in ["MASK_", "GEOMETRY_", "LOBE_", "TLAS_", "RAY_", "SHOW_"] {
         assert!(device.keys().any(|name| name.starts_with(beginning)), "no {beginning}* was found");
     }
     for (name, value) in &device {
@@ -235,6 +235,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         motion: false,
         shapes: false,
         primary_rays: false,
+        lobes: false,
     };
     let cases = [
         ("LIGHTS", Needs { lights: true, ..nothing }),
@@ -249,6 +250,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         ("SHADOW_RAYS", Needs { shadow_rays: true, ..nothing }),
         ("MOTION", Needs { motion: true, ..nothing }),
         ("SHAPES", Needs { shapes: true, ..nothing }),
+        ("LOBES", Needs { lobes: true, ..nothing }),
     ];
     let text = shader_text("shared/needs.glsl");
     let count = text.matches("constant_id").count();

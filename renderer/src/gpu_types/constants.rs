@@ -21,6 +21,24 @@ pub const MATERIAL_ALPHA_MASK: u32 = 4;
 /// [`super::Material::flags`]: alpha is coverage.
 pub const MATERIAL_ALPHA_BLEND: u32 = 8;
 
+/// [`super::MaterialLobes::flags`]: anisotropy.
+pub const LOBE_ANISOTROPY: u32 = 1;
+/// [`super::MaterialLobes::flags`]: clear coat.
+pub const LOBE_CLEARCOAT: u32 = 2;
+/// [`super::MaterialLobes::flags`]: dispersion.
+pub const LOBE_DISPERSION: u32 = 4;
+/// [`super::MaterialLobes::flags`]: thin film.
+pub const LOBE_IRIDESCENCE: u32 = 8;
+/// [`super::MaterialLobes::flags`]: sheen.
+pub const LOBE_SHEEN: u32 = 16;
+/// [`super::MaterialLobes::flags`]: diffuse transmission.
+pub const LOBE_DIFFUSE_TRANSMISSION: u32 = 32;
+/// [`super::MaterialLobes::flags`]: reflectance and glossiness instead of metalness and roughness.
+pub const LOBE_SPECULAR_GLOSSINESS: u32 = 64;
+
+/// Cosines and roughnesses of the table behind [`super::Scene::sheen_albedo`].
+pub const SHEEN_ALBEDO_SIDE: u32 = 32;
+
 /// [`super::Instance::flags`]: the determinant of `render_from_mesh` is below 0.
 pub const INSTANCE_MIRRORED: u32 = 1;
 

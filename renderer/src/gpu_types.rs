@@ -227,7 +227,7 @@ twins! {
     }
 
     /// The scene's tables by device address.
-    struct Scene, size 104 {
+    struct Scene, size 112 {
         /// [`Instance`] by slot.
         0 instances: u64,
         /// `u32[]`: material index, one per (instance, geometry).
@@ -258,6 +258,10 @@ twins! {
         88 environment_radiance: [f32; 3],
         /// Turn of the map around +Y, radians.
         100 environment_rotation_rad: f32,
+        /// Sum of area times luminance over the emissive triangles.
+        104 emissive_power: f32,
+        /// Padding.
+        108 pad0: u32,
     }
 
     /// One view's constants for one frame.

@@ -106,6 +106,8 @@ pub struct Needs {
     pub shapes: bool,
     /// Rays find the primary surfaces, not the rasteriser.
     pub primary_rays: bool,
+    /// Paths carry the light, not the passes for shadow and shading.
+    pub paths: bool,
 }
 
 impl Needs {
@@ -114,7 +116,8 @@ impl Needs {
         let rays = settings.pipeline != Pipeline::Raster;
         let all = settings.needs == NeedsMode::All;
         let roughness_max = (settings.reflection_roughness_max * 1000.0) as u32;
-        let secondary = settings.max_depth > 0;
+        let paths = settings.pipeline == Pipeline::Path;
+        let secondary = paths || settings.max_depth > 0;
         let noisy = !scene.all_lights_hard
             || scene.lights > settings.light_samples
             || scene.emissive_triangles > 0
@@ -133,10 +136,11 @@ impl Needs {
             any_hit: rays && (all || scene.any_hit),
             alpha: all || scene.alpha,
             shadow_rays: rays,
-            temporal: settings.temporal && rays && (all || noisy),
-            motion: all || settings.show == Show::Motion || (settings.temporal && rays && noisy),
+            temporal: settings.temporal && rays && !paths && (all || noisy),
+            motion: all || settings.show == Show::Motion || (settings.temporal && rays && !paths && noisy),
             shapes: rays && (all || scene.shapes),
-            primary_rays: settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
+            primary_rays: paths || settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
+            paths,
         }
     }
 
@@ -197,7 +201,7 @@ impl Needs {
             (self.textures, "texture look-ups", "no material has a texture"),
             (self.normal_maps, "normal mapping", "no material has a normal map"),
             (
-                rays && self.reflection,
+                rays && (self.reflection || self.paths),
                 "reflection rays",
                 why_no_secondary("no surface is smooth enough to mirror"),
             ),
@@ -224,6 +228,8 @@ impl Needs {
                 "temporal denoising",
                 if !rays {
                     no_rays
+                } else if self.paths {
+                    "paths are averaged, not filtered"
                 } else if settings.temporal {
                     "every light is hard, so one ray gives the exact shadow"
                 } else {

@@ -6,10 +6,10 @@ use glam::{Mat4, Vec2};
 use crate::accel::Accel;
 use crate::delta::Invalidation;
 use crate::error::Result;
-use crate::gpu_types::{self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC};
+use crate::gpu_types::{self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND};
 use crate::needs::Needs;
-use crate::passes::{PassSet, Scope};
-use crate::settings::ToneMap;
+use crate::passes::{PassSet, Radiance, Scope};
+use crate::settings::{Pipeline, ToneMap};
 use crate::tables::Tables;
 use crate::view::{CameraMatrices, View, jitter_px};
 
@@ -59,18 +59,14 @@ pub(crate) fn record(
     if band.first {
         passes.gbuffer.record(recorder, &scope, targets, parity)?;
     }
-    if let Some(shadow) = &passes.shadow {
-        shadow.record(recorder, &scope, targets, parity)?;
-    }
     let filled = view.history.map_or(0, |filled| 1 - filled);
-    if let Some(temporal) = passes.temporal.as_ref().filter(|_| plan.moving) {
-        temporal.record(recorder, &scope, targets, parity, filled, &view.counters.device)?;
+    match &passes.radiance {
+        Radiance::Path(path) => path.record(recorder, &scope, targets)?,
+        Radiance::Deferred(deferred) => {
+            let past = plan.moving.then_some((filled, &view.counters.device));
+            deferred.record(recorder, &scope, targets, parity, past)?;
+        }
     }
-    let light = match (&targets.history, plan.moving) {
-        (Some(history), true) => Some((&history.diffuse[filled], &history.specular[filled])),
-        _ => targets.direct_diffuse.as_ref().zip(targets.direct_specular.as_ref()),
-    };
-    passes.shading.record(recorder, &scope, targets, parity, light)?;
     if band.last && !plan.moving {
         passes.accumulate.record(recorder, &scope, targets, accumulator, &view.counters.device)?;
     }
@@ -99,7 +95,7 @@ pub(crate) fn record(
     if !band.last {
         return Ok(());
     }
-    if plan.moving && passes.temporal.is_some() {
+    if plan.moving && passes.radiance.denoises() {
         view.history = Some(filled);
     }
     if !plan.moving {
@@ -145,12 +141,14 @@ fn frame_constants(
     let jitter = if settings.jitter { jitter_px(&jittered, settings.seed) } else { Vec2::ZERO };
     let previous: Mat4 =
         view.previous.map_or(matrices.clip_from_render, |previous| previous.clip_from_render);
+    let path = settings.pipeline == Pipeline::Path;
     let mut flags = 0;
     for (set, flag) in [
         (matrices.orthographic, FRAME_ORTHOGRAPHIC),
         (plan.moving, FRAME_MOVING),
         (plan.history, FRAME_HISTORY),
         (settings.opaque_glass_shadows, FRAME_OPAQUE_GLASS),
+        (path, FRAME_PATHS_BEND),
     ] {
         flags |= if set { flag } else { 0 };
     }
@@ -173,7 +171,7 @@ fn frame_constants(
         flags,
         light_samples: settings.light_samples.max(1),
         shadow_rays: settings.shadow_rays.max(1),
-        max_depth: settings.max_depth,
+        max_depth: if path { settings.path_depth.unwrap_or(u32::MAX) } else { settings.max_depth },
         tone_map: match settings.tone_map {
             ToneMap::Linear => gpu_types::TONE_MAP_LINEAR,
             ToneMap::Aces => gpu_types::TONE_MAP_ACES,

@@ -179,7 +179,7 @@ twins! {
     }
 
     /// The scene's tables by device address.
-    struct Scene, size 120 {
+    struct Scene, size 128 {
         /// [`Instance`] by slot.
         0 instances: u64,
         /// `u32[]`: material index, one per (instance, geometry).
@@ -214,6 +214,10 @@ twins! {
         104 environment_radiance: [f32; 3],
         /// Turn of the map around +Y, radians.
         116 environment_rotation_rad: f32,
+        /// Sum of area times luminance over the emissive triangles.
+        120 emissive_power: f32,
+        /// Padding.
+        124 pad0: u32,
     }
 
     /// One view's constants for one frame.

@@ -105,6 +105,8 @@ pub struct Needs {
     pub primary_rays: bool,
     /// Lobes of materials beside metallic-roughness, and textures of specular and transmission.
     pub lobes: bool,
+    /// Paths carry the light, not the passes for shadow and shading.
+    pub paths: bool,
 }
 
 impl Needs {
@@ -113,7 +115,8 @@ impl Needs {
         let rays = settings.pipeline != Pipeline::Raster;
         let all = settings.needs == NeedsMode::All;
         let roughness_max = (settings.reflection_roughness_max * 1000.0) as u32;
-        let secondary = settings.max_depth > 0;
+        let paths = settings.pipeline == Pipeline::Path;
+        let secondary = paths || settings.max_depth > 0;
         let noisy = !scene.all_lights_hard
             || scene.lights > settings.light_samples
             || scene.emissive_triangles > 0
@@ -132,10 +135,11 @@ impl Needs {
             any_hit: rays && (all || scene.any_hit),
             alpha: all || scene.alpha,
             shadow_rays: rays,
-            temporal: settings.temporal && rays && (all || noisy),
-            motion: all || settings.show == Show::Motion || (settings.temporal && rays && noisy),
+            temporal: settings.temporal && rays && !paths && (all || noisy),
+            motion: all || settings.show == Show::Motion || (settings.temporal && rays && !paths && noisy),
             shapes: rays && (all || scene.shapes),
-            primary_rays: settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
+            primary_rays: paths || settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
+            paths,
             lobes: all || scene.lobes,
         }
     }
@@ -198,12 +202,8 @@ impl Needs {
             (self.textures, "texture look-ups", "no material has a texture"),
             (self.normal_maps, "normal mapping", "no material has a normal map"),
             (
-                self.lobes,
-                "coats, sheen, films and other lobes",
-                "every material is plain metallic-roughness",
-            ),
-            (
-                rays && self.reflection,
+                rays && (self.reflection || self.paths),
+            lobes: all || scene.lobes,
                 "reflection rays",
                 why_no_secondary("no surface is smooth enough to mirror"),
             ),
@@ -230,6 +230,8 @@ impl Needs {
                 "temporal denoising",
                 if !rays {
                     no_rays
+                } else if self.paths {
+                    "paths are averaged, not filtered"
                 } else if settings.temporal {
                     "every light is hard, so one ray gives the exact shadow"
                 } else {

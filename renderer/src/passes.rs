@@ -3,9 +3,11 @@
 
 mod accumulate;
 mod blas_surface;
+mod deferred;
 mod deform;
 mod gbuffer;
 mod instance_descriptors;
+mod path_trace;
 mod post;
 mod shading;
 mod shadow;
@@ -22,9 +24,11 @@ use caustica_gpu::{
 
 pub(crate) use accumulate::Accumulate;
 pub(crate) use blas_surface::BlasSurface;
+pub(crate) use deferred::Deferred;
 pub(crate) use deform::Deform;
 pub(crate) use gbuffer::GBuffer;
 pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
+pub(crate) use path_trace::PathTrace;
 pub(crate) use post::Post;
 pub(crate) use shading::Shading;
 pub(crate) use shadow::Shadow;
@@ -202,24 +206,38 @@ impl ScenePasses {
     }
 }
 
+/// How light gets from the first surfaces to the camera.
+pub(crate) enum Radiance {
+    /// Direct light, denoised while something moves, then shading with its rays.
+    Deferred(Deferred),
+    /// One path a pixel.
+    Path(PathTrace),
+}
+
+impl Radiance {
+    /// Whether frames are denoised while something moves.
+    pub(crate) fn denoises(&self) -> bool {
+        matches!(self, Self::Deferred(deferred) if deferred.denoises())
+    }
+}
+
 /// The passes of one pipeline for one set of needs.
 pub(crate) struct PassSet {
     pub(crate) gbuffer: GBuffer,
-    pub(crate) shadow: Option<Shadow>,
-    pub(crate) temporal: Option<Temporal>,
-    pub(crate) shading: Shading,
+    pub(crate) radiance: Radiance,
     pub(crate) accumulate: Accumulate,
     pub(crate) post: Post,
 }
 
 impl PassSet {
     pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
-        let needs = builder.needs;
         Ok(Self {
             gbuffer: GBuffer::new(builder)?,
-            shadow: needs.direct_light().then(|| Shadow::new(builder)).transpose()?,
-            temporal: (needs.temporal && needs.direct_light()).then(|| Temporal::new(builder)).transpose()?,
-            shading: Shading::new(builder)?,
+            radiance: if builder.needs.paths {
+                Radiance::Path(PathTrace::new(builder)?)
+            } else {
+                Radiance::Deferred(Deferred::new(builder)?)
+            },
             accumulate: Accumulate::new(builder)?,
             post: Post::new(builder)?,
         })

@@ -13,11 +13,13 @@ pub enum Pipeline {
     Hybrid,
     /// The same with ray-traced primary visibility.
     Raytraced,
+    /// Unbiased path tracing: the reference for all others.
+    Path,
 }
 
 impl Pipeline {
     /// Every pipeline, in the order of menus.
-    pub const ALL: [Self; 3] = [Self::Raster, Self::Hybrid, Self::Raytraced];
+    pub const ALL: [Self; 4] = [Self::Raster, Self::Hybrid, Self::Raytraced, Self::Path];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
@@ -25,6 +27,7 @@ impl Pipeline {
             Self::Raster => "raster",
             Self::Hybrid => "hybrid",
             Self::Raytraced => "raytraced",
+            Self::Path => "path",
         }
     }
 }
@@ -148,8 +151,10 @@ pub struct ViewSettings {
     pub light_samples: u32,
     /// Shadow rays a light and pixel.
     pub shadow_rays: u32,
-    /// Reflections and refractions after the first surface.
+    /// Reflections and refractions after the first surface: `hybrid` and `raytraced`.
     pub max_depth: u32,
+    /// Bounces after the first surface in `path`; `None`: as many as paths take until chance ends them.
+    pub path_depth: Option<u32>,
     /// Surfaces up to this roughness trace their specular lobe; rougher ones see the environment only.
     pub reflection_roughness_max: f32,
     /// Shadow rays stop at glass instead of passing it tinted and unbent.
@@ -174,6 +179,7 @@ impl Default for ViewSettings {
             light_samples: 4,
             shadow_rays: 1,
             max_depth: 12,
+            path_depth: None,
             reflection_roughness_max: 0.5,
             opaque_glass_shadows: false,
             temporal: true,

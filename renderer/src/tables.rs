@@ -217,6 +217,8 @@ impl Tables {
             environment_height,
             environment_radiance: self.environment.radiance(),
             environment_rotation_rad: self.environment.rotation_rad(),
+            emissive_power: self.emissive.power(),
+            pad0: 0,
         }
     }
 }

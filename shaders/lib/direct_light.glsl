@@ -9,10 +9,8 @@
 
 #include "shared/frame.glsl"
 #include "shared/needs.glsl"
-#include "lib/environment.glsl"
-#include "lib/light_sampling.glsl"
+#include "lib/light_rays.glsl"
 #include "lib/random.glsl"
-#include "lib/surface.glsl"
 
 #ifdef LIGHT_WITHOUT_RAYS
 const bool LOBE_MEETS_LIGHTS = false;
@@ -148,85 +146,34 @@ void add_punctual_lights(inout DirectLight sum, Scene scene, Receiver receiver, 
 }
 
 #ifndef SURFACE_GRADIENTS
-// Radiance that a point of a triangle sends to a side; textures at the base level.
-vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Triangle triangle, vec2 barycentric, bool front) {
-    Material material = MaterialTable(scene.materials).at[material_index(scene, emitter.instance, emitter.geometry)];
-    if (!front && !material_emits_behind(material)) {
-        return vec3(0.0);
-    }
-    Attributes attributes = triangle_attributes(scene, emitter.instance, triangle, barycentric);
-    TexturePoint textures_at;
-    textures_at.uv = attributes.uv;
-    textures_at.uv_area = float[2](0.0, 0.0);
-    return material_emissive(material, textures_at);
-}
-
-// One emissive triangle drawn by area x luminance, one point on it, uniform per area.
 void add_emissive_light(inout DirectLight sum, Scene scene, Receiver receiver) {
     if (!NEEDS_EMISSIVE_LIGHTS || scene.emissive_count == 0u) {
         return;
     }
     vec2 choice = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_EMISSIVE, 0u));
     vec2 xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_EMISSIVE, 1u));
-    uint drawn = alias_draw(scene.emissive_alias, scene.emissive_count, choice);
-    float pdf = AliasTable(scene.emissive_alias).at[drawn].pdf;
-    EmissiveTriangle emitter = EmissiveTable(scene.emissive_triangles).at[drawn];
-    Triangle triangle = triangle_fetch(scene, emitter.instance, emitter.geometry, emitter.primitive);
-    vec2 barycentric = triangle_sample(xi);
-    SurfacePoint point = triangle_point(triangle, barycentric);
-    vec3 to_light = point.position - receiver.surface.position;
-    float distance_m = safe_length(to_light);
-    if (!(distance_m > 0.0) || !(pdf > 0.0)) {
-        return;
-    }
-    vec3 direction = to_light / distance_m;
-    float cosine = -dot(direction, point.normal);
-    vec3 radiance = triangle_emission(scene, emitter, triangle, barycentric, cosine > 0.0);
-    float area = 0.5 * triangle_double_area(triangle);
-    vec3 irradiance = radiance * (abs(cosine) * (area / distance_m / distance_m) / pdf);
+    LightRay ray = emissive_ray(scene, receiver.surface, choice, xi);
     float specular_share = receiver.lobe_traced && LOBE_MEETS_LIGHTS ? 0.0 : 1.0;
-    DirectLight reflected = receiver_reflect(receiver, direction, irradiance, specular_share);
-    if (is_dark(reflected)) {
-        return;
-    }
-    // From spawn point to spawn point: the ray ends in front of the emitter by its own offset.
-    vec3 start = surface_spawn(receiver.surface, direction);
-    vec3 end = spawn_position(point.position, point.normal, point.offset_m, -direction);
-    float length_m = safe_length(end - start);
-    vec3 along = normalize_or(end - start, direction);
-    add_light(sum, reflected, start, along, length_m * SEGMENT_END, visibility_seed(receiver, 4094u));
+    DirectLight reflected = receiver_reflect(receiver, ray.direction, ray.irradiance, specular_share);
+    add_light(sum, reflected, ray.origin, ray.along, ray.t_max_m, visibility_seed(receiver, 4094u));
 }
 #endif
 
-// One direction: from the cosine lobe, or for a map by turns from the cosine lobe and the map's alias table, weighted by the balance heuristic
-// over both (one-sample model: Veach 1997, section 9.2.4).
 void add_environment_light(inout DirectLight sum, Scene scene, Receiver receiver) {
     if (!NEEDS_ENVIRONMENT) {
         return;
     }
-    bool by_map = NEEDS_ENVIRONMENT_MAP && scene.environment_width > 0u;
+    bool by_map = environment_by_map(scene);
     vec2 point_xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 2u));
-    vec3 direction;
-    if (by_map && sample_1d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 0u)) < 0.5) {
-        vec2 cell_xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 1u));
-        direction = environment_sample(scene, cell_xi, point_xi);
-    } else {
-        direction = receiver.render_from_local * cosine_sample(point_xi);
-    }
-    float pdf = cosine_pdf(dot(direction, receiver.surface.shading_normal));
-    if (by_map) {
-        pdf = 0.5 * (pdf + environment_pdf(scene, direction));
-    }
-    if (!(pdf > 0.0)) {
-        return;
-    }
-    vec3 irradiance = environment_radiance(scene, direction) / pdf;
+    float strategy_xi = by_map ? sample_1d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 0u)) : 1.0;
+    vec2 cell_xi = by_map ? sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 1u)) : vec2(0.0);
+    LightRay ray = environment_ray(scene, receiver.surface, receiver.render_from_local, strategy_xi, cell_xi, point_xi);
     float specular_share = receiver.lobe_traced ? 0.0 : 1.0;
 #ifdef LIGHT_WITHOUT_RAYS
-    irradiance *= receiver.surface.occlusion;
+    ray.irradiance *= receiver.surface.occlusion;
 #endif
-    DirectLight reflected = receiver_reflect(receiver, direction, irradiance, specular_share);
-    add_light(sum, reflected, surface_spawn(receiver.surface, direction), direction, FLOAT_MAX, visibility_seed(receiver, 4095u));
+    DirectLight reflected = receiver_reflect(receiver, ray.direction, ray.irradiance, specular_share);
+    add_light(sum, reflected, ray.origin, ray.along, ray.t_max_m, visibility_seed(receiver, 4095u));
 }
 
 // draws: lights visited; rays: shadow rays to each of them.

@@ -91,8 +91,28 @@ Scatter scatter_glass(Surface surface, Sides sides, bool may_reflect, bool may_t
     return Scatter(reflectance < 1.0, true, keep_below(direction, surface.geometric_normal), weight, 0.0);
 }
 
+// What a microfacet does with light.
+struct CoatShares {
+    vec3 reflected;
+    float base;     // left for what lies below the coat
+    float cos_t;    // of the refracted direction to the microfacet
+};
+
+// Inside a volume the Fresnel term is exact, as Schlick knows no total reflection.
+CoatShares coat_shares(Brdf brdf, Sides sides, bool front, float v_dot_h) {
+    CoatShares shares = CoatShares(fresnel_schlick(brdf.f0, brdf.f90, v_dot_h), brdf_base_share(brdf, v_dot_h), v_dot_h);
+    if (!sides.thin) {
+        float exact = fresnel_dielectric(v_dot_h, sides.eta, shares.cos_t);
+        if (!front || exact >= 1.0) {
+            shares.reflected = vec3(exact);
+            shares.base = 1.0 - exact;
+        }
+    }
+    return shares;
+}
+
 // glTF material: the GGX coat, and through it KHR_materials_transmission, both about one visible normal. A thin sheet sends light on as if
-// mirrored and turned over; a volume bends it. Inside a volume the Fresnel term is exact, as Schlick knows no total reflection.
+// mirrored and turned over; a volume bends it.
 Scatter scatter_pbr(Surface surface, Sides sides, bool may_reflect, bool may_transmit, float choice_xi, vec2 xi) {
     mat3 render_from_local = basis_around(surface.shading_normal);
     vec3 v = surface.view * render_from_local;
@@ -102,17 +122,10 @@ Scatter scatter_pbr(Surface surface, Sides sides, bool may_reflect, bool may_tra
     Brdf brdf = surface_brdf(surface);
     vec3 h = ggx_sample_half(v, brdf.alpha, xi);
     float v_dot_h = clamp(dot(v, h), 0.0, 1.0);
-    vec3 reflectance = fresnel_schlick(brdf.f0, brdf.f90, v_dot_h);
-    float base_share = brdf_base_share(brdf, v_dot_h);
-    float cos_t = v_dot_h;
-    if (!sides.thin) {
-        float exact = fresnel_dielectric(v_dot_h, sides.eta, cos_t);
-        if (!surface.front || exact >= 1.0) {
-            reflectance = vec3(exact);
-            base_share = 1.0 - exact;
-        }
-    }
-    vec3 transmittance = surface.base_color * (base_share * surface.transmission * (1.0 - surface.metallic));
+    CoatShares shares = coat_shares(brdf, sides, surface.front, v_dot_h);
+    vec3 reflectance = shares.reflected;
+    float cos_t = shares.cos_t;
+    vec3 transmittance = surface.base_color * (shares.base * surface.transmission * (1.0 - surface.metallic));
     float probability;
     bool reflects = choose_reflection(may_reflect, may_transmit, max_component(reflectance), max_component(transmittance), choice_xi,
         probability);

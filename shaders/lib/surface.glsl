@@ -102,18 +102,22 @@ Surface surface_shade(Material material, SurfacePoint point, bool front, Attribu
 }
 
 #ifndef SURFACE_GRADIENTS
-// Surface at a hit of a secondary ray. travel: unit direction of the ray; cone_width_m: of the ray cone at the hit.
-Surface surface_from_hit(Scene scene, Hit hit, vec3 travel, float cone_width_m) {
-    Element element = element_fetch(scene, hit);
+// Surface of an element. travel: unit direction of the ray that met it; cone_width_m: of the ray cone there.
+Surface surface_from_element(Scene scene, uint instance_slot, uint geometry, Element element, vec3 travel, float cone_width_m) {
     SurfacePoint point = element_point(element);
-    Attributes attributes = element_attributes(scene, hit.instance, element);
-    Material material = MaterialTable(scene.materials).at[material_index(scene, hit.instance, hit.geometry)];
+    Attributes attributes = element_attributes(scene, instance_slot, element);
+    Material material = MaterialTable(scene.materials).at[material_index(scene, instance_slot, geometry)];
     float cosine = dot(point.normal, travel);
     TexturePoint textures_at;
     textures_at.uv = attributes.uv;
     vec2 uv_area = element_uv_density(element) * (cone_width_m * cone_width_m / abs(cosine));
     textures_at.uv_area = float[2](uv_area.x, uv_area.y); // infinite or NaN where degenerate or edge-on; sample_texture sorts it out
     return surface_shade(material, point, cosine < 0.0, attributes, textures_at, -travel);
+}
+
+// Surface at a hit of a secondary ray.
+Surface surface_from_hit(Scene scene, Hit hit, vec3 travel, float cone_width_m) {
+    return surface_from_element(scene, hit.instance, hit.geometry, element_fetch(scene, hit), travel, cone_width_m);
 }
 
 // Coverage at a hit for any-hit shaders, 0..1. Read at the base level: a mask's edge stays as sharp as it was painted.

@@ -203,6 +203,8 @@ struct Scene {
     uint environment_height;
     vec3 environment_radiance;      // the constant, or the factor on the map
     float environment_rotation_rad; // turn of the map around +Y
+    float emissive_power;           // sum of area x luminance over emissive_triangles
+    uint pad0;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer InstanceTable { Instance at[]; };

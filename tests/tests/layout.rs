@@ -235,6 +235,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         motion: false,
         shapes: false,
         primary_rays: false,
+        paths: false,
         lobes: false,
     };
     let cases = [

@@ -88,6 +88,7 @@ enum PipelineArg {
     Raster,
     Hybrid,
     Raytraced,
+    Path,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -240,6 +241,7 @@ fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
             PipelineArg::Raster => Pipeline::Raster,
             PipelineArg::Hybrid => Pipeline::Hybrid,
             PipelineArg::Raytraced => Pipeline::Raytraced,
+            PipelineArg::Path => Pipeline::Path,
         }),
         needs: args.needs.map_or(of_project.needs, |needs| match needs {
             NeedsArg::Auto => NeedsMode::Auto,
@@ -255,6 +257,7 @@ fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
         exposure_ev: args.exposure.unwrap_or(of_project.exposure_ev),
         seed: args.seed.unwrap_or(of_project.seed),
         max_depth: args.max_depth.unwrap_or(of_project.max_depth),
+        path_depth: args.max_depth.or(of_project.path_depth),
         shadow_rays: args.shadow_rays.unwrap_or(of_project.shadow_rays),
         temporal: false,
         ..of_project

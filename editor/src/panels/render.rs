@@ -55,6 +55,7 @@ fn pipeline_tip(pipeline: Pipeline) -> &'static str {
         Pipeline::Raster => "Rasterised surfaces, deferred shading, no rays",
         Pipeline::Hybrid => "Rasterised surfaces, ray-traced shadows, reflections and refractions",
         Pipeline::Raytraced => "The same with ray-traced first surfaces",
+        Pipeline::Path => "Unbiased path tracing: slow, and what the others are measured by",
     }
 }
 
@@ -101,6 +102,7 @@ fn sampling(ui: &mut Ui, settings: &mut ViewSettings) {
     field(ui, "Depth", "Reflections and refractions after the first surface", |ui| {
         ui.add(DragValue::new(&mut settings.max_depth).range(0..=64).speed(0.1));
     });
+    path_depth(ui, settings);
     field(ui, "Rough limit", "Surfaces rougher than this reflect the environment only", |ui| {
         ui.add(DragValue::new(&mut settings.reflection_roughness_max).range(0.0..=1.0).speed(0.005));
     });
@@ -116,6 +118,17 @@ fn sampling(ui: &mut Ui, settings: &mut ViewSettings) {
         let mut lean = settings.needs == NeedsMode::Auto;
         ui.checkbox(&mut lean, "what is not needed");
         settings.needs = if lean { NeedsMode::Auto } else { NeedsMode::All };
+    });
+}
+
+fn path_depth(ui: &mut Ui, settings: &mut ViewSettings) {
+    field(ui, "Path depth", "Bounces after the first surface in the path tracer; without a limit chance ends each path, and the mean is exact", |ui| {
+        let mut limited = settings.path_depth.is_some();
+        ui.checkbox(&mut limited, "at most");
+        settings.path_depth = limited.then(|| settings.path_depth.unwrap_or(settings.max_depth));
+        if let Some(depth) = &mut settings.path_depth {
+            ui.add(DragValue::new(depth).range(0..=1024).speed(0.1));
+        }
     });
 }
 

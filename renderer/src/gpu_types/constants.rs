@@ -79,6 +79,8 @@ pub const FRAME_MOVING: u32 = 2;
 pub const FRAME_HISTORY: u32 = 4;
 /// [`super::Frame::flags`]: shadow rays stop at refractive surfaces.
 pub const FRAME_OPAQUE_GLASS: u32 = 8;
+/// [`super::Frame::flags`]: shadow rays stop where paths bend or spread, which find the light by themselves.
+pub const FRAME_PATHS_BEND: u32 = 16;
 
 /// [`super::Frame::tone_map`]: clamp.
 pub const TONE_MAP_LINEAR: u32 = 0;

@@ -24,6 +24,8 @@ pub(crate) struct Emissive {
     alias: Table<AliasEntry>,
     /// Emitters by slot, with the metric of their transform when the table was made.
     emitters: BTreeMap<u32, Mat3>,
+    /// Sum of area times luminance.
+    power: f64,
     stale: bool,
 }
 
@@ -33,6 +35,7 @@ impl Emissive {
             triangles: Table::new(device, "emissive triangles"),
             alias: Table::new(device, "emissive alias table"),
             emitters: BTreeMap::new(),
+            power: 0.0,
             stale: false,
         }
     }
@@ -82,12 +85,18 @@ impl Emissive {
             let Some(entry) = instances.get(*slot).filter(|entry| !entry.degenerate) else { continue };
             collect(*slot, entry, materials, meshes, &mut triangles, &mut weights);
         }
+        self.power = weights.iter().sum();
         self.triangles.replace(triangles);
         self.alias.replace(alias::build(&weights));
     }
 
     pub(crate) fn len(&self) -> u32 {
         self.triangles.len() as u32
+    }
+
+    /// Sum of area times luminance, square metres times radiance.
+    pub(crate) fn power(&self) -> f32 {
+        self.power as f32
     }
 
     pub(crate) fn address(&self) -> u64 {

@@ -11,7 +11,7 @@ const FIRST_BANDS: u32 = 16;
 /// Most bands of a sample.
 const MOST_BANDS: u32 = 128;
 /// Passes that are cut; the others run once a sample.
-const CUT_PASSES: [&str; 2] = ["shadow.trace", "shading.trace"];
+const CUT_PASSES: [&str; 3] = ["shadow.trace", "shading.trace", "path_trace"];
 
 /// Rows of one submit.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -54,7 +54,7 @@ impl Targets {
             )
         };
         let pasts = if needs.temporal { 2 } else { 1 };
-        let light = needs.direct_light();
+        let light = needs.direct_light() && !needs.paths;
         let history = if needs.temporal && light {
             let pair = |name: &str| -> Result<[Image; 2]> {
                 Ok([make(name, Format::Rgba32Float)?, make(name, Format::Rgba32Float)?])

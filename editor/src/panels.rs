@@ -14,6 +14,7 @@ pub mod bars;
 pub mod environment;
 pub mod inspector;
 pub mod material;
+mod material_lobes;
 pub mod mesh;
 pub mod outliner;
 pub mod overlays;

@@ -51,7 +51,7 @@ impl SceneSummary {
         self.normal_maps |= material.normal_texture.is_some();
         self.emission |= emits(material) || material.mode == ShadingMode::Unlit;
         self.mirrors |= material.mode == ShadingMode::Reflective;
-        self.transmission |= transmits(material);
+        self.transmission |= transmits(material) || scatters_into_volume(material);
         self.alpha |= has_alpha(material);
         self.any_hit |= !is_opaque(material);
         if material.mode == ShadingMode::Pbr {
@@ -66,6 +66,12 @@ impl SceneSummary {
     pub(crate) fn without_materials() -> Self {
         Self { min_roughness_permille: 1001, all_lights_hard: true, ..Self::default() }
     }
+}
+
+/// Whether light enters a volume scattered (KHR_materials_diffuse_transmission).
+fn scatters_into_volume(material: &Material) -> bool {
+    let scatters = material.lobes.as_ref().is_some_and(|lobes| lobes.diffuse_transmission > 0.0);
+    scatters && material.has_volume && material.mode == ShadingMode::Pbr
 }
 
 /// What is built and run for one view.
@@ -202,8 +208,12 @@ impl Needs {
             (self.textures, "texture look-ups", "no material has a texture"),
             (self.normal_maps, "normal mapping", "no material has a normal map"),
             (
+                self.lobes,
+                "coats, sheen, films and other lobes",
+                "every material is plain metallic-roughness",
+            ),
+            (
                 rays && (self.reflection || self.paths),
-            lobes: all || scene.lobes,
                 "reflection rays",
                 why_no_secondary("no surface is smooth enough to mirror"),
             ),

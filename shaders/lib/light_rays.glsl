@@ -31,8 +31,10 @@ float emissive_pdf(Scene scene, Material material, float distance_m, float cosin
     return share > 0.0 ? share * distance_m / abs(cosine) * distance_m : 0.0;
 }
 
-// Radiance that a point of a triangle sends to a side; textures at the base level.
-vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Material material, Triangle triangle, vec2 barycentric, bool front) {
+// Radiance that a point of a triangle sends along a direction; textures at the base level.
+vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Material material, Triangle triangle, vec2 barycentric, SurfacePoint point,
+    vec3 leaving) {
+    bool front = dot(leaving, point.normal) > 0.0;
     if (!front && !material_emits_behind(material)) {
         return vec3(0.0);
     }
@@ -40,6 +42,9 @@ vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Material material,
     TexturePoint textures_at;
     textures_at.uv = attributes.uv;
     textures_at.uv_area = float[2](0.0, 0.0);
+    if (material_has_lobes(material)) {
+        return surface_shade(scene, material, point, front, attributes, textures_at, leaving).emissive;
+    }
     return material_emissive(material, textures_at);
 }
 
@@ -59,7 +64,7 @@ LightRay emissive_ray(Scene scene, Surface surface, vec2 choice, vec2 xi) {
     Material material = MaterialTable(scene.materials).at[material_index(scene, emitter.instance, emitter.geometry)];
     vec3 towards = to_light / distance_m;
     float cosine = -dot(towards, point.normal);
-    vec3 radiance = triangle_emission(scene, emitter, material, triangle, barycentric, cosine > 0.0);
+    vec3 radiance = triangle_emission(scene, emitter, material, triangle, barycentric, point, -towards);
     float area = 0.5 * triangle_double_area(triangle);
     LightRay ray;
     ray.direction = towards;

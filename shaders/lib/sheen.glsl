@@ -31,7 +31,7 @@ float sheen_lambda_exponent(float x, float share) {
 float sheen_lambda(float cosine, float alpha) {
     float share = (1.0 - alpha) * (1.0 - alpha);
     return exp(cosine < 0.5 ? sheen_lambda_exponent(cosine, share)
-        : 2.0 * sheen_lambda_exponent(0.5, share) - sheen_lambda_exponent(1.0 - cosine, share));
+        : 2.0 * sheen_lambda_exponent(0.5, share) - sheen_lambda_exponent(max(1.0 - cosine, 0.0), share)); // rounding may pass 1
 }
 
 // Density of fibre normals, 1/sr. sin2: squared sine of the half vector's angle.

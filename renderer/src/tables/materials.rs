@@ -81,7 +81,7 @@ impl Materials {
             None => self.free_lobes.pop().unwrap_or(self.lobes.len() as u32),
         };
         if flags_of(lobes) & LOBE_SHEEN != 0 && self.sheen_albedo.len() == 0 {
-            self.sheen_albedo.replace(albedo_table());
+            self.sheen_albedo.replace(albedo_table().to_vec());
         }
         self.lobes.set(index as usize, pack_lobes(lobes, textures));
         index + 1

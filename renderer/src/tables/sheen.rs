@@ -16,9 +16,9 @@ const STEPS: [usize; 2] = [128, 64];
 /// Row by row from the smallest roughness, each from grazing to perpendicular: with x and y in 0..1 the cosine is
 /// `COSINE_MIN + (1 - COSINE_MIN) x^2` and the roughness `ROUGHNESS_MIN + (1 - ROUGHNESS_MIN) y`.
 #[must_use]
-pub fn albedo_table() -> Vec<f32> {
+pub fn albedo_table() -> &'static [f32] {
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-    TABLE.get_or_init(|| (0..SHEEN_ALBEDO_SIDE).flat_map(row).collect()).clone()
+    TABLE.get_or_init(|| (0..SHEEN_ALBEDO_SIDE).flat_map(row).collect())
 }
 
 fn row(y: u32) -> impl Iterator<Item = f32> {

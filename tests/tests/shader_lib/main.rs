@@ -12,6 +12,8 @@ mod environment;
 mod fresnel;
 mod ggx;
 mod lights;
+mod lobes;
+mod lobes_bsdf;
 mod offsets;
 mod random;
 mod scatter;

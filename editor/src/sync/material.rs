@@ -132,3 +132,67 @@ fn lobes_of(
     }
     lobes
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn sent(material: &scene::Material) -> delta::Material {
+        material_of(material, |id| id.0 != 13)
+    }
+
+    #[test]
+    fn plain_materials_and_lobes_without_strength_bring_no_record() {
+        let texture = Some(scene::TextureUse::new(scene::TextureId(1)));
+        let material = scene::Material {
+            clearcoat: Some(scene::Clearcoat { texture, ..Default::default() }),
+            sheen: Some(scene::Sheen { color_texture: texture, ..Default::default() }),
+            thickness_texture: texture,
+            transmission_texture: texture,
+            ..Default::default()
+        };
+        let sent = sent(&material);
+        assert!(sent.lobes.is_none());
+        assert_eq!(sent.textures().count(), 0, "textures that nothing looks at are not uploaded");
+    }
+
+    #[test]
+    fn lobes_are_sent_with_their_textures_and_without_those_that_are_gone() {
+        let texture = |id| Some(scene::TextureUse::new(scene::TextureId(id)));
+        let material = scene::Material {
+            specular_texture: texture(1),
+            clearcoat: Some(scene::Clearcoat {
+                factor: 0.5,
+                texture: texture(2),
+                roughness_texture: texture(13),
+                ..Default::default()
+            }),
+            ..Default::default()
+        };
+        let lobes = sent(&material).lobes.unwrap();
+        assert_eq!(lobes.clearcoat, 0.5);
+        assert!(lobes.clearcoat_roughness_texture.is_none());
+        let used: Vec<u64> = sent(&material).textures().map(|used| used.texture.0).collect();
+        assert_eq!(used, [1, 2]);
+        let unlit = scene::Material { mode: scene::ShadingMode::Unlit, ..material };
+        assert!(sent(&unlit).lobes.is_none());
+    }
+
+    #[test]
+    fn specular_glossiness_is_a_dielectric_of_that_reflectance() {
+        let lobe = scene::SpecularGlossiness {
+            specular: Vec3::new(0.2, 0.4, 0.6),
+            glossiness: 0.75,
+            texture: None,
+        };
+        let material = scene::Material { specular_glossiness: Some(lobe), ..Default::default() };
+        let sent = sent(&material);
+        assert_eq!((sent.metallic, sent.roughness, sent.specular), (0.0, 0.25, 1.0));
+        assert_eq!(sent.specular_color, Vec3::new(0.2, 0.4, 0.6));
+        let interface = (sent.ior - 1.0) / (sent.ior + 1.0);
+        assert_eq!(interface * interface, 1.0, "F0 is the colour itself");
+        assert_eq!(sent.lobes.unwrap().glossiness, Some(0.75));
+    }
+}

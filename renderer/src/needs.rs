@@ -207,11 +207,7 @@ impl Needs {
             (self.environment_map || !self.environment, "environment map", "the environment is a constant"),
             (self.textures, "texture look-ups", "no material has a texture"),
             (self.normal_maps, "normal mapping", "no material has a normal map"),
-            (
-                self.lobes,
-                "coats, sheen, films and other lobes",
-                "every material is plain metallic-roughness",
-            ),
+            (self.lobes, "coats, sheen, films and other lobes", "every material is plain metallic-roughness"),
             (
                 rays && (self.reflection || self.paths),
                 "reflection rays",

@@ -86,7 +86,8 @@ fn lobes_of(
     if material.mode == scene::ShadingMode::Refractive {
         return lobes;
     }
-    lobes.transmission_texture = texture(&material.transmission_texture).filter(|_| material.transmission > 0.0);
+    lobes.transmission_texture =
+        texture(&material.transmission_texture).filter(|_| material.transmission > 0.0);
     match &material.specular_glossiness {
         Some(lobe) => {
             lobes.glossiness = Some(lobe.glossiness);
@@ -182,11 +183,8 @@ mod tests {
 
     #[test]
     fn specular_glossiness_is_a_dielectric_of_that_reflectance() {
-        let lobe = scene::SpecularGlossiness {
-            specular: Vec3::new(0.2, 0.4, 0.6),
-            glossiness: 0.75,
-            texture: None,
-        };
+        let lobe =
+            scene::SpecularGlossiness { specular: Vec3::new(0.2, 0.4, 0.6), glossiness: 0.75, texture: None };
         let material = scene::Material { specular_glossiness: Some(lobe), ..Default::default() };
         let sent = sent(&material);
         assert_eq!((sent.metallic, sent.roughness, sent.specular), (0.0, 0.25, 1.0));

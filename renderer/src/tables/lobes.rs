@@ -4,8 +4,8 @@ use super::materials::pack_texture;
 use super::textures::Textures;
 use crate::delta::{Lobes, TextureUse};
 use crate::gpu_types::{
-    LOBE_ANISOTROPY, LOBE_CLEARCOAT, LOBE_DIFFUSE_TRANSMISSION, LOBE_DISPERSION, LOBE_IRIDESCENCE, LOBE_SHEEN,
-    LOBE_SPECULAR_GLOSSINESS, MaterialLobes,
+    LOBE_ANISOTROPY, LOBE_CLEARCOAT, LOBE_DIFFUSE_TRANSMISSION, LOBE_DISPERSION, LOBE_IRIDESCENCE,
+    LOBE_SHEEN, LOBE_SPECULAR_GLOSSINESS, MaterialLobes,
 };
 
 /// Which lobes there are: those of strength 0 are none, whatever their textures.

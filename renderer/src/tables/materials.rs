@@ -13,8 +13,8 @@ use super::textures::Textures;
 use crate::delta::{self, AlphaMode, MaterialId, ShadingMode};
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{
-    self, LOBE_SHEEN, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_DOUBLE_SIDED, MATERIAL_HAS_VOLUME, MODE_PBR,
-    MODE_REFLECTIVE, MODE_REFRACTIVE, MODE_UNLIT, NO_TEXTURE,
+    self, LOBE_SHEEN, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_DOUBLE_SIDED, MATERIAL_HAS_VOLUME,
+    MODE_PBR, MODE_REFLECTIVE, MODE_REFRACTIVE, MODE_UNLIT, NO_TEXTURE,
 };
 
 /// All materials, by id.

@@ -93,8 +93,7 @@ fn sheen(v: DVec3, l: DVec3, roughness: f64) -> f64 {
         let (a, b, c) = (mix(21.5473, 25.3245), mix(3.82987, 3.32435), mix(0.19823, 0.16801));
         a / (1.0 + b * x.powf(c)) + mix(-1.97760, -1.27393) * x + mix(-4.32054, -4.85967)
     };
-    let lambda =
-        |x: f64| if x < 0.5 { fit(x).exp() } else { (2.0 * fit(0.5) - fit(1.0 - x)).exp() };
+    let lambda = |x: f64| if x < 0.5 { fit(x).exp() } else { (2.0 * fit(0.5) - fit(1.0 - x)).exp() };
     let h = (v + l).normalize();
     let d = (2.0 + 1.0 / alpha) * (h.x * h.x + h.y * h.y).powf(0.5 / alpha) / TAU;
     d / ((1.0 + lambda(v.z) + lambda(l.z)) * 4.0 * v.z * l.z)

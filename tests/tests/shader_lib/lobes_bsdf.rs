@@ -156,11 +156,18 @@ fn directions_are_drawn_as_the_density_says_and_no_energy_is_made() {
                     continue;
                 }
                 let pdf = f64::from(row[6]);
-                assert!((f64::from(row[8]) / pdf - 1.0).abs() < 2e-3, "{label}: density {pdf} and {}", row[8]);
+                assert!(
+                    (f64::from(row[8]) / pdf - 1.0).abs() < 2e-3,
+                    "{label}: density {pdf} and {}",
+                    row[8]
+                );
                 for channel in 0..3 {
                     let value = f64::from(row[9 + channel]);
                     let expected = f64::from(row[3 + channel]) * pdf;
-                    assert!((value - expected).abs() < 2e-3 * (expected + 1e-3), "{label}: {value} {expected}");
+                    assert!(
+                        (value - expected).abs() < 2e-3 * (expected + 1e-3),
+                        "{label}: {value} {expected}"
+                    );
                     weight[channel] += f64::from(row[3 + channel]) / SAMPLES as f64;
                 }
                 let turn = f64::from(row[1]).atan2(f64::from(row[0])).rem_euclid(2.0 * PI) / (2.0 * PI);
@@ -170,7 +177,10 @@ fn directions_are_drawn_as_the_density_says_and_no_energy_is_made() {
             }
             let total: u64 = counts.iter().sum();
             let covered: f64 = (0..cells).map(share).sum();
-            assert!((total as f64 / SAMPLES as f64 - covered).abs() < 0.02, "{label}: {total} drawn, {covered}");
+            assert!(
+                (total as f64 / SAMPLES as f64 - covered).abs() < 0.02,
+                "{label}: {total} drawn, {covered}"
+            );
             let expected: Vec<f64> = (0..cells).map(|i| share(i) / covered * total as f64).collect();
             let deviate = chi_square_deviate_against(&counts, &expected);
             assert!(deviate < 4.0, "{label}: chi-square {deviate}");

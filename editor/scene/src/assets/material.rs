@@ -4,9 +4,7 @@
 use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
-use super::lobes::{
-    Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, SpecularGlossiness,
-};
+use super::lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, SpecularGlossiness};
 use super::texture::TextureUse;
 
 /// How a surface answers light.
@@ -269,9 +267,10 @@ impl Material {
         let anisotropy = self.anisotropy.iter().flat_map(|lobe| vec![lobe.strength, lobe.rotation_rad]);
         let clearcoat =
             self.clearcoat.iter().flat_map(|lobe| vec![lobe.factor, lobe.roughness, lobe.normal_scale]);
-        let iridescence = self.iridescence.iter().flat_map(|lobe| {
-            vec![lobe.factor, lobe.ior, lobe.thickness_min_nm, lobe.thickness_max_nm]
-        });
+        let iridescence = self
+            .iridescence
+            .iter()
+            .flat_map(|lobe| vec![lobe.factor, lobe.ior, lobe.thickness_min_nm, lobe.thickness_max_nm]);
         anisotropy
             .chain(clearcoat)
             .chain(iridescence)

@@ -109,7 +109,10 @@ fn factors_and_textures_are_read_under_their_names() {
     let members = r#"{"iridescenceFactor":0.5,"iridescenceIor":1.8,"iridescenceThicknessMinimum":50,
         "iridescenceThicknessMaximum":900,"iridescenceThicknessTexture":{"index":0}}"#;
     let film = material_with(folder.path(), "iridescence", members).0.iridescence.unwrap();
-    assert_eq!((film.factor, film.ior, film.thickness_min_nm, film.thickness_max_nm), (0.5, 1.8, 50.0, 900.0));
+    assert_eq!(
+        (film.factor, film.ior, film.thickness_min_nm, film.thickness_max_nm),
+        (0.5, 1.8, 50.0, 900.0)
+    );
     assert_eq!(material_with(folder.path(), "dispersion", r#"{"dispersion":0.36}"#).0.dispersion, 0.36);
 }
 
@@ -174,13 +177,20 @@ fn a_project_keeps_lobes_and_the_audit_looks_at_them() {
     let own = old.sheen.as_ref().and_then(|sheen| sheen.color_texture).unwrap().texture;
     let value = Material {
         dispersion: 0.4,
-        clearcoat: Some(Clearcoat { factor: 0.5, texture: Some(TextureUse::new(own)), ..Clearcoat::default() }),
+        clearcoat: Some(Clearcoat {
+            factor: 0.5,
+            texture: Some(TextureUse::new(own)),
+            ..Clearcoat::default()
+        }),
         iridescence: Some(Iridescence { factor: 7.0, ..Iridescence::default() }),
         ..old
     };
     document.apply(Edit::SetMaterial { material: id, value: Box::new(value.clone()) }).unwrap();
     let findings: Vec<String> = audit(&document).iter().map(ToString::to_string).collect();
-    assert!(findings.iter().any(|f| f.contains("iridescence is 7, outside of what is physical")), "{findings:?}");
+    assert!(
+        findings.iter().any(|f| f.contains("iridescence is 7, outside of what is physical")),
+        "{findings:?}"
+    );
 
     let path = folder.path().join("scene.caustica");
     Project::save(&path, &document, &ProjectMeta::default()).unwrap();

@@ -64,7 +64,8 @@ impl Reader<'_> {
             material.base_color_texture = self.texture_use(&pbr, "baseColorTexture", true)?;
             material.metallic = self.within(&pbr, "metallicFactor", 1.0, UNIT)?;
             material.roughness = self.within(&pbr, "roughnessFactor", 1.0, UNIT)?;
-            material.metallic_roughness_texture = self.texture_use(&pbr, "metallicRoughnessTexture", false)?;
+            material.metallic_roughness_texture =
+                self.texture_use(&pbr, "metallicRoughnessTexture", false)?;
         }
         (material.normal_texture, material.normal_scale) = self.normal_map(item, "normalTexture")?;
         if let Some(occlusion) = item.child("occlusionTexture")? {

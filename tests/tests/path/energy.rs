@@ -19,22 +19,30 @@ fn sheet(ior: f32) -> Material {
     }
 }
 
-/// A ball of one material in a white room of radiance 1.
-fn furnace(name: &str, material: Material, samples: u64) -> (f64, f64, f64) {
-    let mut scene = Scene::new();
-    scene.put(sphere(0.8, 64), material, Affine3A::IDENTITY);
-    scene.surround(1.0);
-    let camera = camera_at(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, 0.6);
-    let mut studio = Studio::of(EXTENT, settings(), &scene.delta, camera);
-    let image = studio.mean(samples);
-    let (mean, error) = mean_and_error(&image, 0);
-    let spoilt = studio.statistics().non_finite;
-    assert_eq!(spoilt, 0, "{name}: samples that are not finite");
-    (mean, error, image.mean.iter().map(|p| f64::from(p[0])).fold(0.0, f64::max))
+/// A ball in a white room of radiance 1.
+struct Furnace(Studio);
+
+impl Furnace {
+    fn new() -> Self {
+        Self(Studio::new(EXTENT, settings()))
+    }
+
+    /// Mean radiance with a ball of this material, and its standard error.
+    fn with(&mut self, name: &str, material: Material, samples: u64) -> (f64, f64) {
+        let mut scene = Scene::new();
+        scene.put(sphere(0.8, 64), material, Affine3A::IDENTITY);
+        scene.surround(1.0);
+        self.0.restage(&scene.delta, camera_at(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, 0.6));
+        let image = self.0.mean(samples);
+        let spoilt = self.0.statistics().non_finite;
+        assert_eq!(spoilt, 0, "{name}: samples that are not finite");
+        mean_and_error(&image, 0)
+    }
 }
 
 #[test]
 fn white_surfaces_vanish_in_a_white_room() {
+    let mut furnace = Furnace::new();
     for (name, material) in [
         ("diffuse", lambert(1.0)),
         ("mirror", mirror()),
@@ -42,23 +50,24 @@ fn white_surfaces_vanish_in_a_white_room() {
         ("diamond", glass(2.417)),
         ("sheet", sheet(1.5)),
     ] {
-        let (mean, error, _) = furnace(name, material, 32);
+        let (mean, error) = furnace.with(name, material, 32);
         assert!((mean - 1.0).abs() < 4.0 * error + 1e-4, "{name}: {mean} +- {error}");
     }
 }
 
 #[test]
 fn rough_coats_and_rough_glass_make_no_light() {
+    let mut furnace = Furnace::new();
     for roughness in [0.0, 0.01, 0.3, 1.0] {
         let metal = Material { metallic: 1.0, roughness, ..Material::default() };
         let frosted =
             Material { metallic: 0.0, roughness, transmission: 1.0, has_volume: true, ..Material::default() };
         let pane = Material { has_volume: false, double_sided: true, ..frosted.clone() };
         for (name, material) in [("metal", metal), ("frosted glass", frosted), ("frosted sheet", pane)] {
-            let (mean, error, _) = furnace(&format!("{name}, roughness {roughness}"), material, 16);
+            let (mean, error) = furnace.with(&format!("{name}, roughness {roughness}"), material, 16);
             // Single scattering loses light at high roughness (glTF 2.0 appendix B); furnace-ggx has how much.
             assert!(mean < 1.0 + 4.0 * error + 1e-4, "{name}, roughness {roughness}: {mean} +- {error}");
-            let least = if roughness > 0.1 { 0.5 } else { 0.96 };
+            let least = if roughness > 0.1 { 0.4 } else { 0.96 };
             assert!(mean > least, "{name}, roughness {roughness}: {mean}");
         }
     }

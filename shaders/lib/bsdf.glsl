@@ -139,6 +139,10 @@ BsdfValue bsdf_reflected(Bsdf bsdf, vec3 v, vec3 l, vec3 h) {
 // l on the other side, h the microfacet normal that sends v there; h.z > 0.
 BsdfValue bsdf_transmitted(Bsdf bsdf, vec3 v, vec3 l, vec3 h) {
     float v_dot_h = clamp(dot(v, h), 0.0, 1.0);
+    CoatShares shares = coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, v_dot_h);
+    if (shares.cos_t <= 0.0) {
+        return BSDF_NOTHING; // total reflection
+    }
     float pdf = interface_pdf(bsdf, v, h);
     if (!bsdf.sides.thin) {
         float l_dot_h = dot(l, h);
@@ -146,7 +150,6 @@ BsdfValue bsdf_transmitted(Bsdf bsdf, vec3 v, vec3 l, vec3 h) {
         // From the density of h to that of l: Walter et al., equation 17, with eta = n(v) / n(l).
         pdf *= l_dot_h < 0.0 ? 4.0 * v_dot_h * -l_dot_h / (denominator * denominator) : 0.0;
     }
-    CoatShares shares = coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, v_dot_h);
     float weight = shares.base * interface_weight(bsdf, v, vec3(l.xy, -l.z)) * layers_base_share(bsdf.layers, v.z, -l.z);
     return BsdfValue(bsdf.transmitted * (weight * pdf), bsdf.chance_transmit * pdf);
 }

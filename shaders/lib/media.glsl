@@ -91,12 +91,14 @@ float medium_ior(Scene scene, uint medium, uint channel) {
     return NEEDS_LOBES ? dispersion_ior(ior, medium_dispersion(scene, medium), channel) : ior;
 }
 
-// Beer and Lambert over a distance.
+// Beer and Lambert over a distance. Bounded, so that a compiler that turns exp into exp2 cannot make it infinite: 0 x infinity is not 1.
+const float LONGEST_M = 1e30;
+
 vec3 medium_transmittance(Scene scene, uint medium, float distance_m) {
     if (medium == MEDIUM_AIR) {
         return vec3(1.0);
     }
-    return exp(-MaterialTable(scene.materials).at[medium].attenuation_per_m * distance_m);
+    return exp(-MaterialTable(scene.materials).at[medium].attenuation_per_m * min(distance_m, LONGEST_M));
 }
 
 // What lies on both sides of a surface that encloses a volume, seen in the direction of travel.

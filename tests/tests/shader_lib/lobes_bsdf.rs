@@ -7,29 +7,15 @@ use caustica_tests::compute::{Snippet, bytes, run};
 use caustica_tests::gpu::session;
 use caustica_tests::numbers::chi_square_deviate_against;
 
+use super::scatter::SURFACE;
+
 /// A white metal or a plain dielectric, in the plane z = 0, seen under cosine `mu` from (1, 1).
 const FUNCTIONS: &str = "
     Surface plain_surface(float mu, float roughness, float metallic) {
-        Surface s;
-        s.position = vec3(0.0);
-        s.offset_m = 0.0;
-        s.geometric_normal = vec3(0.0, 0.0, 1.0);
-        s.shading_normal = vec3(0.0, 0.0, 1.0);
+        Surface s = white_surface(mu, roughness, MODE_PBR, true, 0u);
         s.view = vec3(vec2(sqrt(0.5 * (1.0 - mu * mu))), mu);
-        s.base_color = vec3(1.0);
         s.metallic = metallic;
-        s.roughness = roughness;
-        s.ior = 1.5;
         s.transmission = 0.0;
-        s.specular = 1.0;
-        s.specular_color = vec3(1.0);
-        s.attenuation_per_m = vec3(0.0);
-        s.occlusion = 1.0;
-        s.emissive = vec3(0.0);
-        s.mode = MODE_PBR;
-        s.front = true;
-        s.flags = 0u;
-        s.lobes = LOBES_NONE;
         return s;
     }
     // What each case has: see CASES.
@@ -100,7 +86,7 @@ fn run_cases(body: &str, values: usize, count: usize) -> Vec<f32> {
     );
     let snippet = Snippet {
         includes: &["lib/bsdf.glsl", "lib/random.glsl"],
-        functions: FUNCTIONS,
+        functions: &format!("{SURFACE}{FUNCTIONS}"),
         body: &body,
         values,
         count,
@@ -220,7 +206,7 @@ fn lobes_of_no_strength_change_no_bit() {
         write(0u, different);";
     let snippet = Snippet {
         includes: &["lib/bsdf.glsl", "lib/random.glsl"],
-        functions: FUNCTIONS,
+        functions: &format!("{SURFACE}{FUNCTIONS}"),
         body,
         values: 1,
         count: 256,
@@ -265,7 +251,7 @@ fn nothing_is_ever_not_finite() {
         write(0u, bad);";
     let snippet = Snippet {
         includes: &["lib/bsdf.glsl", "lib/random.glsl"],
-        functions: FUNCTIONS,
+        functions: &format!("{SURFACE}{FUNCTIONS}"),
         body,
         values: 12,
         count: 1 << 14,

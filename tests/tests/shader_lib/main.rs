@@ -4,6 +4,7 @@
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
 mod accumulate;
+mod bsdf;
 mod color;
 mod deform;
 mod descriptors;

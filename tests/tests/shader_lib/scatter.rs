@@ -3,8 +3,8 @@
 use caustica_tests::compute::{Snippet, run};
 use caustica_tests::gpu::session;
 
-/// A white surface in the plane z = 0, seen under cosine `mu`.
-const FUNCTIONS: &str = "
+/// `white_surface`: in the plane z = 0, seen under cosine `mu`.
+pub(super) const SURFACE: &str = "
     Surface white_surface(float mu, float roughness, uint mode, bool front, uint flags) {
         Surface s;
         s.position = vec3(0.0);
@@ -68,7 +68,7 @@ fn glass_sends_on_what_arrives() {
         &mut session,
         &Snippet {
             includes: &["lib/scatter.glsl", "lib/random.glsl"],
-            functions: FUNCTIONS,
+            functions: SURFACE,
             body,
             values: 5,
             count: 512,
@@ -119,7 +119,7 @@ fn two_interfaces_of_a_prism_bend_as_snell_says() {
         &mut session,
         &Snippet {
             includes: &["lib/scatter.glsl", "lib/random.glsl"],
-            functions: FUNCTIONS,
+            functions: SURFACE,
             body,
             values: 4,
             count: 64,

@@ -169,6 +169,7 @@ fn frame_constants(
         accumulator: view.accumulator.as_ref().map_or(0, caustica_gpu::Buffer::address),
         sample_index,
         selection,
+        ggx_albedo: if settings.multiple_scattering { tables.ggx_albedo_address() } else { 0 },
         seed: settings.seed,
         flags,
         light_samples: settings.light_samples.max(1),

@@ -221,7 +221,7 @@ twins! {
     }
 
     /// One view's constants for one frame.
-    struct Frame, size 368 {
+    struct Frame, size 376 {
         /// Jittered, by columns; reverse depth: 1 at the near plane, 0 at infinity.
         0 clip_from_render: [f32; 16],
         /// The same without jitter.
@@ -250,34 +250,36 @@ twins! {
         296 sample_index: u64,
         /// Device address of a bit set by instance slot: the outlined ones; 0: nothing is selected.
         304 selection: u64,
+        /// Device address of the table of `lib/ggx_albedo.glsl`; 0: light is reflected once by rough surfaces.
+        312 ggx_albedo: u64,
         /// Seed of all random numbers.
-        312 seed: u32,
+        320 seed: u32,
         /// `FRAME_*` bits.
-        316 flags: u32,
+        324 flags: u32,
         /// Lights a pixel; all of them when there are at most this many.
-        320 light_samples: u32,
+        328 light_samples: u32,
         /// Shadow rays a light and pixel, at least 1.
-        324 shadow_rays: u32,
+        332 shadow_rays: u32,
         /// Reflections and refractions after the first surface.
-        328 max_depth: u32,
+        336 max_depth: u32,
         /// `TONE_MAP_*`.
-        332 tone_map: u32,
+        340 tone_map: u32,
         /// Surfaces up to this roughness trace their specular lobe.
-        336 reflection_roughness_max: f32,
+        344 reflection_roughness_max: f32,
         /// Upper bound on the history length while moving, frames.
-        340 temporal_max_history: f32,
+        348 temporal_max_history: f32,
         /// Which block of its stream this sample belongs to.
-        344 block_index: u32,
+        352 block_index: u32,
         /// 1 when this sample is the first of its block.
-        348 block_start: u32,
+        356 block_start: u32,
         /// 1 when this sample is the last of its block.
-        352 block_end: u32,
+        360 block_end: u32,
         /// Samples in the accumulator before this frame; 0: it is overwritten.
-        356 accumulated: u32,
+        364 accumulated: u32,
         /// Instance slots that the bit set of `selection` covers.
-        360 selection_count: u32,
+        368 selection_count: u32,
         /// Zero.
-        364 pad0: u32,
+        372 pad0: u32,
     }
 
     /// What the device counts in a frame.

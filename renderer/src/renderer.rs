@@ -212,6 +212,9 @@ impl Renderer {
         let settings = view.settings().clone();
         let needs = Needs::of(&self.summary, &settings);
         self.prepare_passes(needs, id, recorder.slot())?;
+        if settings.multiple_scattering {
+            self.tables.provide_ggx_albedo(recorder)?;
+        }
         let (Some(view), Some(passes)) =
             (self.views.get_mut(&id), self.passes.get(&(settings.pipeline, needs)))
         else {

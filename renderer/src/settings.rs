@@ -155,6 +155,8 @@ pub struct ViewSettings {
     pub max_depth: u32,
     /// Bounces after the first surface in `path`; `None`: as many as paths take until chance ends them.
     pub path_depth: Option<u32>,
+    /// In `path`, rough interfaces reflect the light too that they scatter more than once; off is glTF to the letter.
+    pub multiple_scattering: bool,
     /// Surfaces up to this roughness trace their specular lobe; rougher ones see the environment only.
     pub reflection_roughness_max: f32,
     /// Shadow rays stop at glass instead of passing it tinted and unbent.
@@ -180,6 +182,7 @@ impl Default for ViewSettings {
             shadow_rays: 1,
             max_depth: 12,
             path_depth: None,
+            multiple_scattering: false,
             reflection_roughness_max: 0.5,
             opaque_glass_shadows: false,
             temporal: true,

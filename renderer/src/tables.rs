@@ -8,6 +8,7 @@ mod deforming;
 mod draws;
 mod emissive;
 mod environment;
+mod ggx_albedo;
 mod instances;
 mod lights;
 mod lobes;
@@ -77,6 +78,8 @@ pub(crate) struct Tables {
     pub(crate) draws: Draws,
     pub(crate) deforming: Deforming,
     scene: Table<gpu_types::Scene>,
+    /// Filled when the first view asks for it.
+    ggx_albedo: Table<f32>,
     /// Stands for every table in the barrier tracker: they are read by address, which no binding shows.
     group: ResourceId,
     geometry_group: ResourceId,
@@ -95,6 +98,7 @@ impl Tables {
             draws: Draws::new(device),
             deforming: Deforming::new(device),
             scene: Table::new(device, "scene"),
+            ggx_albedo: Table::new(device, "GGX albedo"),
             group: device.new_resource_id(),
             geometry_group: device.new_resource_id(),
         })
@@ -147,6 +151,23 @@ impl Tables {
         }
         changed.deformed.extend(self.deforming.record(recorder, &passes.deform, self.geometry_group)?);
         Ok(())
+    }
+
+    /// Uploads the table of what rough interfaces reflect at once, where it is not there yet.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub(crate) fn provide_ggx_albedo(&mut self, recorder: &mut Recorder) -> Result<()> {
+        if self.ggx_albedo.len() == 0 {
+            self.ggx_albedo.replace(ggx_albedo::table());
+            recorder.declare(&[Use::Group(self.group, Stage::Transfer, Access::TransferWrite)]);
+        }
+        self.ggx_albedo.flush(recorder)
+    }
+
+    /// Device address of that table; 0: it is not there.
+    pub(crate) fn ggx_albedo_address(&self) -> u64 {
+        self.ggx_albedo.address()
     }
 
     /// Device address of the `Scene` record.

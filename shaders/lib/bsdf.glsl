@@ -19,6 +19,7 @@ struct Bsdf {
     vec3 transmitted;       // likewise of what passes
     vec3 beyond;            // likewise of what passes scattered
     Layers layers;
+    vec3 compensation;      // share that light reflected more than once adds to the interface (lib/ggx_albedo.glsl); 0: glTF to the letter
     bool front;
     bool sharp_reflection;  // a mirror, or rays that pass straight or bend as one
     bool sharp_transmission;
@@ -89,6 +90,7 @@ Bsdf bsdf_begin(Surface surface, Sides sides, mat3 render_from_local, vec3 v) {
     bsdf.diffuse = surface_diffuse_albedo(surface) * (1.0 - through);
     bsdf.beyond = surface.lobes.diffuse_transmission_color * ((1.0 - surface.metallic) * (1.0 - surface.transmission) * through);
     bsdf.transmitted = surface_transmits(surface) ? surface.base_color * ((1.0 - surface.metallic) * surface.transmission) : vec3(0.0);
+    bsdf.compensation = vec3(0.0);
     bsdf.front = surface.front;
     bsdf.sharp_reflection = !bsdf.anisotropic && ggx_is_delta(bsdf.brdf.alpha);
     bsdf.sharp_transmission = bsdf.sharp_reflection || (!sides.thin && sides.eta == 1.0);
@@ -126,7 +128,7 @@ BsdfValue bsdf_reflected(Bsdf bsdf, vec3 v, vec3 l, vec3 h) {
     result.value = bsdf.diffuse * (shares.base * l.z / PI);
     result.pdf = bsdf_chance_diffuse(bsdf) * cosine_pdf(l.z);
     if (!bsdf.sharp_reflection) {
-        result.value += shares.reflected * interface_value(bsdf, v, l, h);
+        result.value += shares.reflected * (1.0 + bsdf.compensation) * interface_value(bsdf, v, l, h);
         result.pdf += bsdf.chance_reflect * interface_pdf(bsdf, v, h);
     }
     if (NEEDS_LOBES && bsdf.layers.flags != 0u) {

@@ -33,6 +33,7 @@ const uint LOBE_SHEEN = 16u;
 const uint LOBE_DIFFUSE_TRANSMISSION = 32u;
 const uint LOBE_SPECULAR_GLOSSINESS = 64u;
 
+const uint GGX_ALBEDO_SIDE = 32u;   // cosines and roughnesses of the table Frame.ggx_albedo (lib/ggx_albedo.glsl)
 const uint SHEEN_ALBEDO_SIDE = 32u; // cosines and roughnesses of the table Scene.sheen_albedo (lib/sheen.glsl)
 
 // Instance.flags

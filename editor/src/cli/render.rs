@@ -57,9 +57,12 @@ pub(super) struct RenderArgs {
     /// Seed of all random numbers
     #[arg(long)]
     seed: Option<u32>,
-    /// Reflections and refractions after the first surface
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
+    /// Reflections and refractions after the first surface; bounces in `path`, where the default is no limit
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1024))]
     max_depth: Option<u32>,
+    /// In `path`, reflect the light too that rough surfaces scatter more than once (off: glTF to the letter)
+    #[arg(long)]
+    multiple_scattering: bool,
     /// Shadow rays a light and pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     shadow_rays: Option<u32>,
@@ -258,6 +261,7 @@ fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
         seed: args.seed.unwrap_or(of_project.seed),
         max_depth: args.max_depth.unwrap_or(of_project.max_depth),
         path_depth: args.max_depth.or(of_project.path_depth),
+        multiple_scattering: args.multiple_scattering || of_project.multiple_scattering,
         shadow_rays: args.shadow_rays.unwrap_or(of_project.shadow_rays),
         temporal: false,
         ..of_project

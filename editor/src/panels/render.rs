@@ -135,6 +135,14 @@ fn path_depth(ui: &mut Ui, settings: &mut ViewSettings) {
             }
         },
     );
+    field(
+        ui,
+        "Rough metal",
+        "In the path tracer, reflect the light too that rough surfaces scatter more than once; off is glTF to the letter",
+        |ui| {
+            ui.checkbox(&mut settings.multiple_scattering, "scatters repeatedly");
+        },
+    );
 }
 
 fn moving(cx: &mut Cx<'_>, ui: &mut Ui, settings: &mut ViewSettings) {

@@ -71,6 +71,9 @@ pub const LIGHT_SPOT: u32 = 1;
 /// [`super::Light::kind`].
 pub const LIGHT_DIRECTIONAL: u32 = 2;
 
+/// Cosines, and roughnesses, of the table behind [`super::Frame::ggx_albedo`].
+pub const GGX_ALBEDO_SIDE: u32 = 32;
+
 /// [`super::Frame::flags`]: parallel projection.
 pub const FRAME_ORTHOGRAPHIC: u32 = 1;
 /// [`super::Frame::flags`]: post shows the denoised signals of this frame, not the accumulated mean.

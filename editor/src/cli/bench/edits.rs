@@ -1,6 +1,8 @@
 //! Edits of other kinds than a move, on one node of documents of more and more nodes. Enters: sessions. Leaves: host time of
 //! edit, sync and apply, by kind and size, and device time of the builds of the TLAS.
 
+use std::time::Instant;
+
 use caustica_renderer::gpu::BuildMode;
 use caustica_renderer::{AccelBench, TlasWork};
 use caustica_scene::{Edit, Material};
@@ -8,7 +10,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::crowd::Crowd;
-use super::moves::{Pair, TLAS_PASS, WAIT_MS};
+use super::moves::{Pair, TLAS_PASS, WAIT_MS, goes_on};
 use super::series::{Series, Spread, passes_ms};
 use super::table::{Table, count, times};
 use crate::session::Lap;
@@ -66,7 +68,8 @@ pub(super) fn run(
     bar: &ProgressBar,
 ) -> anyhow::Result<Vec<Row>> {
     let mut tallies = vec![vec![Tally::default(); STEPS.len()]; pairs.len()];
-    for round in 0..rounds {
+    let start = Instant::now();
+    for round in (0..).take_while(|round| goes_on(*round, rounds, start)) {
         for (index, (_, step)) in STEPS.iter().enumerate() {
             for (pair, tally) in pairs.iter_mut().zip(&mut tallies) {
                 accel.keep_busy(WAIT_MS)?;

@@ -7,7 +7,7 @@
 
 mod tables;
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use caustica_renderer::gpu::{BuildMode, Frames};
 use caustica_renderer::{AccelBench, BareStructure, Pipeline, TlasWork};
@@ -32,6 +32,14 @@ const FLOOD_BYTES: usize = 128 << 20;
 /// How long the queue is empty before the refits that are to find a device at rest.
 const REST: Duration = Duration::from_millis(100);
 const REST_ROUNDS: usize = 8;
+/// Rounds of a slow device end after this long, but not before so many.
+const ENOUGH: Duration = Duration::from_secs(180);
+const FEWEST_ROUNDS: usize = 15;
+
+/// Whether another round of at most `most` is due, `round` of them being done since `start`.
+pub(super) fn goes_on(round: usize, most: usize, start: Instant) -> bool {
+    round < most && (round < FEWEST_ROUNDS || start.elapsed() < ENOUGH)
+}
 
 /// Host time of a move under one condition.
 #[derive(Debug, Default, Serialize)]
@@ -146,7 +154,8 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
         accel.warm_up()?;
         // One round of each document after the other, so that a slow second of the machine falls on all of them.
         bar.set_message(pipeline.name());
-        for round in 0..rounds {
+        let start = Instant::now();
+        for round in (0..).take_while(|round| goes_on(*round, rounds, start)) {
             for (pair, tally) in pairs.iter_mut().zip(&mut tallies) {
                 one_round(&mut accel, pair, &mut flood, round, tally)?;
                 bar.inc(1);

@@ -23,8 +23,8 @@ pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
 pub use inventory::{EnvironmentEntry, InstanceEntry, Inventory, Layout, MaterialEntry, MeshEntry, Place};
 pub use measure::{
-    AccelBench, AccelStatistics, BlasTimes, DeviceProfile, LeftOut, ProfileInForce, Statistics, TlasTimes,
-    TlasWork,
+    AccelBench, AccelStatistics, BareStructure, BlasTimes, DeviceProfile, LeftOut, ProfileInForce,
+    Statistics, TlasTimes, TlasWork,
 };
 pub use needs::{Needs, SceneSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};

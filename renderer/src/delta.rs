@@ -258,10 +258,10 @@ pub enum Invalidation {
     /// Exposure, tone map, overlay, selection, a swap between equal variants: samples are kept.
     #[default]
     Nothing,
+    /// Size of the view: starts again, history is dropped with the targets, whatever else happens.
+    Resize,
     /// The camera moved: this view starts again, history is reprojected by motion vectors.
     Camera,
-    /// Size of the view: starts again, history is dropped.
-    Resize,
     /// Materials, lights, environment, transforms: all views start again, history is reprojected.
     Scene,
     /// Pipeline, quality setting, shader or render origin: all starts again, history is dropped.

@@ -14,6 +14,7 @@ mod passes;
 mod renderer;
 mod settings;
 pub mod shader;
+mod summary;
 mod tables;
 mod view;
 
@@ -26,7 +27,7 @@ pub use measure::{
     AccelBench, AccelStatistics, BareStructure, BlasTimes, DeviceProfile, LeftOut, ProfileInForce,
     Statistics, TlasTimes, TlasWork,
 };
-pub use needs::{Needs, SceneSummary};
+pub use needs::{Needs, SceneSummary, SurfaceSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
 pub use settings::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
 pub use tables::sheen_albedo_table;

@@ -30,6 +30,10 @@ pub struct View {
     device: Arc<Device>,
     camera: Camera,
     settings: ViewSettings,
+    /// Size in pixels at full resolution.
+    full_extent: [u32; 2],
+    /// What the full resolution is divided by.
+    divisor: u32,
     extent: [u32; 2],
     pub(crate) accumulation: Accumulation,
     pub(crate) statistics: Statistics,
@@ -89,6 +93,8 @@ impl View {
             device: Arc::clone(device),
             camera: Camera::default(),
             settings,
+            full_extent: extent.map(|n| n.max(1)),
+            divisor: 1,
             extent: extent.map(|n| n.max(1)),
             accumulation: Accumulation::default(),
             statistics: Statistics::default(),
@@ -107,7 +113,7 @@ impl View {
         })
     }
 
-    /// Size in pixels.
+    /// Size in pixels, as it is rendered.
     pub fn extent(&self) -> [u32; 2] {
         self.extent
     }
@@ -174,14 +180,33 @@ impl View {
         self.accumulation.invalidate(what, reason);
     }
 
-    /// Changes the size. Resets the view when it differs from the last one.
-    pub fn resize(&mut self, extent: [u32; 2]) {
-        let extent = extent.map(|n| n.max(1));
+    /// Changes the size at full resolution. Resets the view when it differs from the last one.
+    pub fn resize(&mut self, full_extent: [u32; 2]) {
+        let full_extent = full_extent.map(|n| n.max(1));
+        if full_extent != self.full_extent {
+            self.full_extent = full_extent;
+            self.follow_extent("size of the view");
+        }
+    }
+
+    /// Changes what the full resolution is divided by, at least 1. Resets the view when it differs from the last one. The
+    /// resolution follows what moves, so that whatever was the last reason stays it.
+    pub fn set_divisor(&mut self, divisor: u32) {
+        let divisor = divisor.max(1);
+        if divisor != self.divisor {
+            self.divisor = divisor;
+            let reason = self.accumulation.reason().to_owned();
+            self.follow_extent(&reason);
+        }
+    }
+
+    fn follow_extent(&mut self, reason: &str) {
+        let extent = self.full_extent.map(|side| side.div_ceil(self.divisor));
         if extent != self.extent {
             self.extent = extent;
             self.drop_targets();
             self.accumulator = None;
-            self.accumulation.invalidate(Invalidation::Resize, "size of the view");
+            self.accumulation.invalidate(Invalidation::Resize, reason);
         }
     }
 

@@ -24,7 +24,7 @@ pub use assets::{
 };
 pub use audit::{Finding, Severity, Subject, audit};
 pub use changes::{ChangeSet, Content};
-pub use document::{Document, Placed, Renderable};
+pub use document::{Document, Driven, Placed, Renderable};
 pub use edit::{Edit, EditError, OverrideField};
 pub use ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
 pub use node::{Node, NodeKind, RayVisibility, Subtree};

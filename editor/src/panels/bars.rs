@@ -295,8 +295,8 @@ pub fn status(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.spacing_mut().item_spacing.x = 12.0;
-            let ms: f64 = statistics.passes.iter().map(|(_, ms)| ms).sum();
-            ui.label(mono(format!("{ms:7.2} ms"))).on_hover_text("All passes of a frame on the device");
+            let ms = super::milliseconds(cx.session.device_ms(), 2);
+            ui.label(mono(format!("{ms:>7} ms"))).on_hover_text("All passes of a frame on the device");
             ui.label(mono(format!("{:6} samples", statistics.samples))).on_hover_text("Samples in each pixel of the picture");
             if let Some(audit) = &cx.state.health {
                 let problems = audit.findings.iter().filter(|f| f.severity != caustica_scene::Severity::Info).count();

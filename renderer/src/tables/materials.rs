@@ -147,15 +147,18 @@ pub(crate) enum MaterialChange {
     Values,
     /// Its emitters shine differently.
     Emission,
-    /// Rays pass where they did not, faces are culled differently, or it began or ended to shine: the instances belong
-    /// elsewhere.
+    /// It began or ended to shine: its instances are emitters, or no longer.
+    Shine,
+    /// Rays pass where they did not, or faces are culled differently: its instances belong elsewhere, whether they shine or not.
     Kind,
 }
 
 fn change_between(old: &delta::Material, new: &delta::Material) -> MaterialChange {
-    let kind = |m: &delta::Material| (is_opaque(m), shows_both_sides(m), has_alpha(m), emits(m));
+    let kind = |m: &delta::Material| (is_opaque(m), shows_both_sides(m), has_alpha(m));
     if kind(old) != kind(new) {
         MaterialChange::Kind
+    } else if emits(old) != emits(new) {
+        MaterialChange::Shine
     } else if old.emissive != new.emissive {
         MaterialChange::Emission
     } else {

@@ -12,6 +12,7 @@ mod measure;
 mod needs;
 mod passes;
 mod renderer;
+mod sampling;
 mod settings;
 pub mod shader;
 mod tables;
@@ -28,5 +29,6 @@ pub use measure::{
 };
 pub use needs::{Needs, SceneSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
-pub use settings::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+pub use sampling::Sampling;
+pub use settings::{NeedsMode, Pipeline, Sampler, Show, ToneMap, ViewSettings};
 pub use view::{View, ViewId};

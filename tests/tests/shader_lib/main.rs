@@ -14,6 +14,8 @@ mod ggx;
 mod lights;
 mod offsets;
 mod random;
+mod samplers;
+mod samplers_apart;
 mod scatter;
 mod shape_surface;
 mod shapes;

@@ -19,17 +19,17 @@ fn joint_deviate(values: &[f32], width: usize, [a, b]: [usize; 2]) -> f64 {
 #[test]
 fn dimensions_of_a_pixel_are_independent() {
     const SAMPLES: usize = 1024;
-    const PIXELS: usize = 16;
+    const SEEDS: usize = 16;
     const SETS: usize = 6;
     let mut session = session();
     // Dimensions with bases of their own, padded ones, another pixel and the other stream; last the naive form: the first and
     // the second pair of padded dimensions scrambled, but not shuffled.
     let body = "
-        uvec2 at = uvec2(index / 1024u, 5u);
+        uint seed = index / 1024u;
         uint64_t i = uint64_t(index % 1024u);
-        Sequence s = sequence_begin(8u, at, i * 2ul);
-        Sequence pixel = sequence_begin(8u, at + uvec2(0u, 1u), i * 2ul);
-        Sequence stream = sequence_begin(8u, at, i * 2ul + 1ul);
+        Sequence s = sequence_begin(seed, uvec2(5u, 5u), i * 2ul);
+        Sequence pixel = sequence_begin(seed, uvec2(6u, 5u), i * 2ul);
+        Sequence stream = sequence_begin(seed, uvec2(5u, 5u), i * 2ul + 1ul);
         uint light = sample_dimension(0u, 0u, PURPOSE_LIGHT_POINT, 0u);
         uint padded = sample_dimension(1u, 0u, PURPOSE_LOBE, 0u);
         vec2 points[6] = vec2[6](sample_2d(s, sample_dimension(0u, 0u, PURPOSE_JITTER, 0u)), sample_2d(s, light), sample_2d(s, padded),
@@ -38,15 +38,15 @@ fn dimensions_of_a_pixel_are_independent() {
             write(2u * k, points[k].x);
             write(2u * k + 1u, points[k].y);
         }
-        write(12u, unit_float(bitfieldReverse(owen_permute_reversed(uint(i), hash_combine(at.x, 17u)))));
-        write(13u, unit_float(bitfieldReverse(owen_permute_reversed(uint(i), hash_combine(at.x, 18u)))));";
+        write(12u, unit_float(bitfieldReverse(owen_permute_reversed(uint(i), hash_combine(seed, 17u)))));
+        write(13u, unit_float(bitfieldReverse(owen_permute_reversed(uint(i), hash_combine(seed, 18u)))));";
     for sampler in Sampler::ALL {
-        let values = draw(&mut session, sampler, 2 * SAMPLES as u64, body, 14, SAMPLES * PIXELS);
+        let values = draw(&mut session, sampler, 2 * SAMPLES as u64, body, 14, SAMPLES * SEEDS);
         // Shuffled nets lie together in wide cells less evenly than independent numbers, in narrow ones more so: the deviate of
-        // one pixel spreads by 2.4, whatever the number of samples. The mean of 16 spreads by 0.6.
+        // one seed spreads by 2.4, whatever the number of samples. The mean of 16 spreads by 0.6.
         let deviate = |columns| {
-            let pixels = values.chunks_exact(14 * SAMPLES);
-            pixels.map(|pixel| joint_deviate(pixel, 14, columns)).sum::<f64>() / PIXELS as f64
+            let seeds = values.chunks_exact(14 * SAMPLES);
+            seeds.map(|points| joint_deviate(points, 14, columns)).sum::<f64>() / SEEDS as f64
         };
         for (a, b) in (0..SETS).flat_map(|a| (a + 1..SETS).map(move |b| (a, b))) {
             // Pixels of blue noise share their sequence, and differ by an offset alone.

@@ -362,6 +362,15 @@ impl Session {
         Ok(())
     }
 
+    /// Says how many samples are going to be taken; `None`: nobody knows.
+    ///
+    /// # Errors
+    /// When the view was removed.
+    pub fn set_sample_target(&mut self, samples: Option<u64>) -> anyhow::Result<()> {
+        self.renderer.view_mut(self.view)?.set_sample_target(samples);
+        Ok(())
+    }
+
     /// Outlines these targets.
     pub fn set_selection(&mut self, selection: &BTreeSet<Target>) {
         if self.selection != *selection {

@@ -13,7 +13,7 @@ use crate::needs::Needs;
 use crate::passes::{PassSet, Radiance, Scope};
 use crate::settings::{Pipeline, ToneMap};
 use crate::tables::Tables;
-use crate::view::{CameraMatrices, View, jitter_px};
+use crate::view::{CameraMatrices, View};
 
 /// Records one frame of a view.
 ///
@@ -136,11 +136,10 @@ fn frame_constants(
     let extent = view.extent();
     let sample = view.accumulation.next_sample();
     let sample_index = if plan.moving { view.accumulation.next_moving_index() } else { sample.index };
-    let jittered =
-        crate::accumulation::Sample { index: sample_index, stream: (sample_index % 2) as u32, ..sample };
     let selection = selection_address(recorder, view)?;
     let settings = view.settings();
-    let jitter = if settings.jitter { jitter_px(&jittered, settings.seed) } else { Vec2::ZERO };
+    let jitter =
+        if settings.jitter { view.sampling().jitter_px(settings.seed, sample_index) } else { Vec2::ZERO };
     let previous: Mat4 =
         view.previous.map_or(matrices.clip_from_render, |previous| previous.clip_from_render);
     let path = settings.pipeline == Pipeline::Path;

@@ -12,6 +12,7 @@ mod measure;
 mod needs;
 mod passes;
 mod renderer;
+mod sampling;
 mod settings;
 pub mod shader;
 mod summary;
@@ -29,6 +30,7 @@ pub use measure::{
 };
 pub use needs::{Needs, SceneSummary, SurfaceSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
-pub use settings::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+pub use sampling::Sampling;
+pub use settings::{NeedsMode, Pipeline, Sampler, Show, ToneMap, ViewSettings};
 pub use tables::sheen_albedo_table;
 pub use view::{View, ViewId};

@@ -17,6 +17,7 @@ use crate::inventory::{self, Inventory};
 use crate::measure::Statistics;
 use crate::needs::Needs;
 use crate::passes::{Builder, PassSet, ScenePasses};
+use crate::sampling::Sampling;
 use crate::settings::{Pipeline, ViewSettings};
 use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
 use crate::summary::Summary;
@@ -63,7 +64,7 @@ pub struct Renderer {
     scene_passes: ScenePasses,
     views: BTreeMap<ViewId, View>,
     next_view: u32,
-    passes: HashMap<(Pipeline, Needs), PassSet>,
+    passes: HashMap<(Pipeline, Needs, Sampling), PassSet>,
     summary: Summary,
     changed: Changed,
     picked: Buffer,
@@ -212,13 +213,12 @@ impl Renderer {
         let view = self.view(id)?;
         let settings = view.settings().clone();
         let needs = Needs::of(self.summary.scene(), &settings);
-        self.prepare_passes(needs, id, recorder.slot())?;
+        let key = (settings.pipeline, needs, view.sampling());
+        self.prepare_passes(key, id, recorder.slot())?;
         if settings.multiple_scattering {
             self.tables.provide_ggx_albedo(recorder)?;
         }
-        let (Some(view), Some(passes)) =
-            (self.views.get_mut(&id), self.passes.get(&(settings.pipeline, needs)))
-        else {
+        let (Some(view), Some(passes)) = (self.views.get_mut(&id), self.passes.get(&key)) else {
             return Ok(());
         };
         frame::read_counters(view, recorder.slot());
@@ -254,17 +254,25 @@ impl Renderer {
         Ok(self.view(id)?.statistics())
     }
 
-    fn prepare_passes(&mut self, needs: Needs, id: ViewId, frame_slot: usize) -> Result<()> {
+    fn prepare_passes(
+        &mut self,
+        key: (Pipeline, Needs, Sampling),
+        id: ViewId,
+        frame_slot: usize,
+    ) -> Result<()> {
         let view = self.view(id)?;
-        let (pipeline, show, window) = (view.settings().pipeline, view.settings().show, view.is_for_window());
+        let (show, window) = (view.settings().show, view.is_for_window());
+        let (_, needs, sampling) = key;
+        let mut specialization = needs.specialization();
+        specialization.values.extend(sampling.specialization().values);
         let mut builder = Builder {
             device: &self.device,
             library: &mut self.library,
             set: self.tables.textures.set_of(frame_slot),
             needs,
-            specialization: needs.specialization(),
+            specialization,
         };
-        let passes = match self.passes.entry((pipeline, needs)) {
+        let passes = match self.passes.entry(key) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => entry.insert(PassSet::new(&mut builder)?),
         };

@@ -62,6 +62,40 @@ impl ToneMap {
     }
 }
 
+/// Where the random numbers of a picture come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampler {
+    /// Owen-scrambled Sobol points.
+    #[default]
+    Sobol,
+    /// Halton points, scrambled a pixel.
+    Halton,
+    /// Hammersley sets of as many points as samples are asked for.
+    Hammersley,
+    /// Independent numbers: hashed PCG.
+    Independent,
+    /// Sobol points with blue-noise offsets between the pixels.
+    BlueNoise,
+}
+
+impl Sampler {
+    /// Every sampler, in the order of menus.
+    pub const ALL: [Self; 5] =
+        [Self::Sobol, Self::Halton, Self::Hammersley, Self::Independent, Self::BlueNoise];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sobol => "sobol",
+            Self::Halton => "halton",
+            Self::Hammersley => "hammersley",
+            Self::Independent => "independent",
+            Self::BlueNoise => "blue-noise",
+        }
+    }
+}
+
 /// What a view shows: the image, or one of the intermediate targets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -145,6 +179,8 @@ pub struct ViewSettings {
     pub exposure_ev: f32,
     /// Tone map.
     pub tone_map: ToneMap,
+    /// Where the random numbers come from.
+    pub sampler: Sampler,
     /// Seed of all random numbers.
     pub seed: u32,
     /// Lights a pixel in the shadow pass; all of them when there are at most this many.
@@ -177,6 +213,7 @@ impl Default for ViewSettings {
             needs: NeedsMode::Auto,
             exposure_ev: 0.0,
             tone_map: ToneMap::Neutral,
+            sampler: Sampler::Sobol,
             seed: 0,
             light_samples: 4,
             shadow_rays: 1,

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse};
 
 pub(crate) use bands::Bands;
-pub(crate) use camera::{CameraMatrices, jitter_px};
+pub(crate) use camera::CameraMatrices;
 pub(crate) use targets::Targets;
 
 use crate::accumulation::Accumulation;
@@ -19,6 +19,7 @@ use crate::error::Result;
 use crate::gpu_types::AccumulatorPixel;
 use crate::measure::Statistics;
 use crate::needs::Needs;
+use crate::sampling::Sampling;
 use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
 
 /// Names a view of a renderer.
@@ -34,6 +35,8 @@ pub struct View {
     full_extent: [u32; 2],
     /// What the full resolution is divided by.
     divisor: u32,
+    /// Samples that the caller is going to take; `None`: nobody knows.
+    sample_target: Option<u64>,
     extent: [u32; 2],
     pub(crate) accumulation: Accumulation,
     pub(crate) statistics: Statistics,
@@ -95,6 +98,7 @@ impl View {
             settings,
             full_extent: extent.map(|n| n.max(1)),
             divisor: 1,
+            sample_target: None,
             extent: extent.map(|n| n.max(1)),
             accumulation: Accumulation::default(),
             statistics: Statistics::default(),
@@ -164,6 +168,21 @@ impl View {
         self.accumulation.set_offset(offset);
     }
 
+    /// Says how many samples are going to be taken, as far as known: Hammersley sets are made for a number. Resets the
+    /// view when its samples depend on it.
+    pub fn set_sample_target(&mut self, samples: Option<u64>) {
+        let before = self.sampling();
+        self.sample_target = samples;
+        if self.sampling() != before {
+            self.accumulation.invalidate(Invalidation::Everything, "number of samples");
+        }
+    }
+
+    /// How random numbers are drawn.
+    pub(crate) fn sampling(&self) -> Sampling {
+        Sampling::of(self.settings.sampler, self.sample_target)
+    }
+
     /// Moves the camera. Resets the view when it differs from the last one.
     pub fn set_camera(&mut self, camera: Camera) {
         if camera != self.camera {
@@ -175,7 +194,11 @@ impl View {
     /// Changes settings. Exposure, tone map, what is shown and the choice of variants keep the samples.
     pub fn set_settings(&mut self, settings: ViewSettings) {
         let what = invalidation_of(&self.settings, &settings);
-        let reason = if settings.pipeline == self.settings.pipeline { "render settings" } else { "pipeline" };
+        let reason = match &self.settings {
+            old if old.pipeline != settings.pipeline => "pipeline",
+            old if old.sampler != settings.sampler => "sampler",
+            _ => "render settings",
+        };
         self.settings = settings;
         self.accumulation.invalidate(what, reason);
     }
@@ -279,7 +302,7 @@ fn invalidation_of(old: &ViewSettings, new: &ViewSettings) -> Invalidation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::NeedsMode;
+    use crate::settings::{NeedsMode, Sampler};
 
     #[test]
     fn what_only_changes_the_display_keeps_the_samples() {
@@ -296,6 +319,7 @@ mod tests {
             ViewSettings { pipeline: Pipeline::Raster, ..old.clone() },
             ViewSettings { max_depth: 1, ..old.clone() },
             ViewSettings { seed: 9, ..old.clone() },
+            ViewSettings { sampler: Sampler::Halton, ..old.clone() },
             ViewSettings { shadow_rays: 2, ..old.clone() },
         ] {
             assert_eq!(invalidation_of(&old, &changed), Invalidation::Everything);

@@ -5,9 +5,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use caustica_renderer::Needs;
 use caustica_renderer::gpu_types::twins;
 use caustica_renderer::shader::{ShaderSources, SpirvCache, compile, reflect};
+use caustica_renderer::{Needs, Sampler, Sampling};
 use caustica_tests::compute::shader_text;
 use caustica_tests::{repository, shader_folder};
 
@@ -264,4 +264,23 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         assert_eq!(set, [(id.parse().expect("a number"), 1)], "{name}");
         assert_eq!(needs.specialization().values.len(), count);
     }
+}
+
+#[test]
+fn the_sampler_is_specialised_alike_on_both_sides() {
+    let text = shader_text("shared/sampler.glsl");
+    let id_of = |name: &str| {
+        let line = text.lines().find(|line| line.contains(&format!(" const uint {name} ="))).expect(name);
+        let id = line.split("constant_id = ").nth(1).and_then(|rest| rest.split(')').next()).expect(name);
+        id.parse::<u32>().expect("a number")
+    };
+    let device = constants(&text, "const uint ", "=");
+    for sampler in Sampler::ALL {
+        let name = format!("SAMPLER_{}", sampler.name().replace('-', "_").to_uppercase());
+        let size = if sampler == Sampler::Hammersley { 50 } else { Sampling::UNKNOWN_SET };
+        let expected = [(id_of("SAMPLER"), device[&name]), (id_of("HAMMERSLEY_SIZE"), size)];
+        assert_eq!(Sampling::of(sampler, Some(100)).specialization().values, expected, "{name}");
+    }
+    let needs = shader_text("shared/needs.glsl").matches("constant_id").count() as u32;
+    assert!(needs <= id_of("SAMPLER"), "the constants of needs.glsl have grown into these");
 }

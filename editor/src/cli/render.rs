@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use caustica_renderer::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+use caustica_renderer::{NeedsMode, Pipeline, Sampler, Show, ToneMap, ViewSettings};
 use caustica_scene::Edit;
 use clap::{ArgGroup, Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -54,6 +54,10 @@ pub(super) struct RenderArgs {
     /// An environment map (.hdr, .exr), or a constant radiance R,G,B
     #[arg(long, value_name = "FILE|R,G,B")]
     environment: Option<String>,
+    /// Where random numbers come from. A Hammersley set is made for half of --samples, as there are two streams; without
+    /// --samples, for 256
+    #[arg(long, value_enum)]
+    sampler: Option<SamplerArg>,
     /// Seed of all random numbers
     #[arg(long)]
     seed: Option<u32>,
@@ -106,6 +110,20 @@ enum ToneMapArg {
     Aces,
     Agx,
     Neutral,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SamplerArg {
+    /// Owen-scrambled Sobol points
+    Sobol,
+    /// Halton points, scrambled a pixel
+    Halton,
+    /// Hammersley sets: even when complete, like independent numbers before
+    Hammersley,
+    /// Independent numbers (hashed PCG)
+    Independent,
+    /// Sobol points with offsets that make errors of neighbouring pixels cancel
+    BlueNoise,
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {
@@ -188,6 +206,7 @@ pub(super) fn run(
         session.set_camera(ViewCamera::of_document(session.document(), Some(name), 1.0));
     }
     session.set_settings(settings_of(args, session.settings().clone()));
+    session.set_sample_target(sample_limit(args))?;
     if args.sample_offset > 0 {
         session.set_sample_offset(args.sample_offset)?;
     }
@@ -200,6 +219,7 @@ pub(super) fn run(
         seconds: run.seconds,
         device: format!("{}, {}", device.name(), device.driver()),
         pipeline: session.settings().pipeline.name(),
+        sampler: session.settings().sampler.name(),
         seed: session.settings().seed,
     };
     let accumulated = session.read_back()?;
@@ -258,6 +278,13 @@ fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
         }),
         show: args.show.unwrap_or_default(),
         exposure_ev: args.exposure.unwrap_or(of_project.exposure_ev),
+        sampler: args.sampler.map_or(of_project.sampler, |sampler| match sampler {
+            SamplerArg::Sobol => Sampler::Sobol,
+            SamplerArg::Halton => Sampler::Halton,
+            SamplerArg::Hammersley => Sampler::Hammersley,
+            SamplerArg::Independent => Sampler::Independent,
+            SamplerArg::BlueNoise => Sampler::BlueNoise,
+        }),
         seed: args.seed.unwrap_or(of_project.seed),
         max_depth: args.max_depth.unwrap_or(of_project.max_depth),
         path_depth: args.max_depth.or(of_project.path_depth),
@@ -275,12 +302,14 @@ struct Run {
     frames: Vec<Vec<(String, f64)>>,
 }
 
+/// Samples to take; `None`: until a time or a noise is reached.
+fn sample_limit(args: &RenderArgs) -> Option<u64> {
+    let other_end = args.time.is_some() || args.target_error.is_some();
+    args.samples.or((!other_end).then_some(DEFAULT_SAMPLES))
+}
+
 fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) -> anyhow::Result<Run> {
-    let samples = args.samples.unwrap_or(if args.time.is_some() || args.target_error.is_some() {
-        u64::MAX
-    } else {
-        DEFAULT_SAMPLES
-    });
+    let samples = sample_limit(args).unwrap_or(u64::MAX);
     let limit =
         args.time.map(|seconds| Duration::try_from_secs_f64(seconds).context("--time")).transpose()?;
     progress.set_length(if samples == u64::MAX { 0 } else { samples });
@@ -345,6 +374,7 @@ fn summary(
         "output": args.output,
         "size": args.size,
         "pipeline": metadata.pipeline,
+        "sampler": metadata.sampler,
         "device": metadata.device,
         "device_profile": profile.map_or_else(|| String::from("default"), |file| file.display().to_string()),
         "at": args.at,

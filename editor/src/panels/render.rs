@@ -1,6 +1,6 @@
 //! Settings of the picture: environment, pipeline, exposure, sampling. Enters and leaves: the view's settings.
 
-use caustica_renderer::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+use caustica_renderer::{NeedsMode, Pipeline, Sampler, Sampling, Show, ToneMap, ViewSettings};
 use egui::{DragValue, Slider, Ui};
 
 use super::{Cx, field, section};
@@ -92,7 +92,48 @@ fn tone_name(tone_map: ToneMap) -> &'static str {
     }
 }
 
+fn sampler_name(sampler: Sampler) -> &'static str {
+    match sampler {
+        Sampler::Sobol => "Sobol",
+        Sampler::Halton => "Halton",
+        Sampler::Hammersley => "Hammersley",
+        Sampler::Independent => "Independent",
+        Sampler::BlueNoise => "Blue noise",
+    }
+}
+
+fn sampler_tip(sampler: Sampler) -> String {
+    match sampler {
+        Sampler::Sobol => {
+            String::from("Even at every number of samples that is a power of two, and nearly so between")
+        }
+        Sampler::Halton => {
+            String::from("Even at any number of samples; large bases need many, so Sobol is mostly better")
+        }
+        Sampler::Hammersley => format!(
+            "Even once a set is complete, noisy before. Here, where nobody knows how many samples there will be, a set \
+             has {} of them; caustica render makes it for --samples",
+            2 * Sampling::UNKNOWN_SET
+        ),
+        Sampler::Independent => {
+            String::from("Independent numbers: the noise that the others are measured by")
+        }
+        Sampler::BlueNoise => String::from(
+            "Sobol whose errors cancel between neighbouring pixels: fine grain at the first samples",
+        ),
+    }
+}
+
 fn sampling(ui: &mut Ui, settings: &mut ViewSettings) {
+    field(ui, "Sampler", "Where random numbers come from. Each leads to the same picture", |ui| {
+        let name = sampler_name(settings.sampler);
+        egui::ComboBox::from_id_salt("sampler").selected_text(name).show_ui(ui, |ui| {
+            for choice in Sampler::ALL {
+                ui.selectable_value(&mut settings.sampler, choice, sampler_name(choice))
+                    .on_hover_text(sampler_tip(choice));
+            }
+        });
+    });
     field(ui, "Lights a pixel", "All lights when there are at most this many, else a random choice", |ui| {
         ui.add(DragValue::new(&mut settings.light_samples).range(1..=64).speed(0.1));
     });

@@ -123,6 +123,17 @@ pub const SHOW_MATERIAL: u32 = 12;
 /// Debug view: source_uint = id target.
 pub const SHOW_TRIANGLE: u32 = 13;
 
+/// Sampler: Owen-scrambled Sobol.
+pub const SAMPLER_SOBOL: u32 = 0;
+/// Sampler: Halton.
+pub const SAMPLER_HALTON: u32 = 1;
+/// Sampler: Hammersley.
+pub const SAMPLER_HAMMERSLEY: u32 = 2;
+/// Sampler: hashed PCG.
+pub const SAMPLER_INDEPENDENT: u32 = 3;
+/// Sampler: Sobol with blue-noise offsets.
+pub const SAMPLER_BLUE_NOISE: u32 = 4;
+
 /// Triangles of one cluster of pass `blas_surface`.
 pub const CLUSTER_TRIANGLES: u32 = 32;
 

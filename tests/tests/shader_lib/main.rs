@@ -17,6 +17,8 @@ mod lobes;
 mod lobes_bsdf;
 mod offsets;
 mod random;
+mod samplers;
+mod samplers_apart;
 mod scatter;
 mod shape_surface;
 mod shapes;

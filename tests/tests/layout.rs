@@ -235,6 +235,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         motion: false,
         shapes: false,
         primary_rays: false,
+        ray_depth: false,
     };
     let cases = [
         ("LIGHTS", Needs { lights: true, ..nothing }),
@@ -249,6 +250,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         ("SHADOW_RAYS", Needs { shadow_rays: true, ..nothing }),
         ("MOTION", Needs { motion: true, ..nothing }),
         ("SHAPES", Needs { shapes: true, ..nothing }),
+        ("RAY_DEPTH", Needs { ray_depth: true, ..nothing }),
     ];
     let text = shader_text("shared/needs.glsl");
     let count = text.matches("constant_id").count();

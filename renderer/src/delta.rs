@@ -10,6 +10,7 @@ mod mesh;
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
+use serde::{Deserialize, Serialize};
 
 pub use lobes::Lobes;
 pub use material::{AlphaMode, Material, Sampler, ShadingMode, Texture, TextureUse, Wrap};
@@ -29,7 +30,7 @@ pub struct TextureId(pub u64);
 
 /// Persistent id of an instance: the scene node that owns it and the part inside that node
 /// (a prefab instance holds many parts).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct InstanceId {
     /// The 64-bit id of the owning scene node.
     pub node: u64,

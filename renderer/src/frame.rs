@@ -10,10 +10,10 @@ use crate::gpu_types::{
     self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND,
 };
 use crate::needs::Needs;
-use crate::passes::{PassSet, Radiance, Scope};
-use crate::settings::{Pipeline, ToneMap};
+use crate::passes::{PassSet, Radiance, Scope, Shown};
+use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
 use crate::tables::Tables;
-use crate::view::{CameraMatrices, View};
+use crate::view::{CameraMatrices, Targets, View};
 
 /// Records one frame of a view.
 ///
@@ -77,15 +77,18 @@ pub(crate) fn record(
     let display = view.display_key();
     let mut displayed = None;
     let has_samples = view.accumulation.samples() > 0;
-    if band.last || (has_samples && view.displayed.as_ref() != Some(&display)) {
-        passes.post.record(
-            recorder,
-            &scope,
-            targets,
-            (parity, shown_history),
-            accumulator,
-            view.settings().show,
-        )?;
+    let shown_anew = view.displayed.as_ref() != Some(&display);
+    if band.last || (has_samples && shown_anew) {
+        let fresh = shown_anew || plan.moving || constants.accumulated == 0;
+        let light_shadow = record_light_shadow(recorder, &scope, view.settings(), targets, passes, fresh)?;
+        let shown = Shown {
+            show: view.settings().show,
+            light_shadow,
+            parity,
+            history: shown_history,
+            added: band.last && !plan.moving,
+        };
+        passes.post.record(recorder, &scope, targets, accumulator, &shown)?;
         displayed = Some(display);
     }
     let counters = &view.counters;
@@ -106,6 +109,26 @@ pub(crate) fn record(
     view.previous = Some(matrices);
     view.frame_count += 1;
     Ok(())
+}
+
+/// Traces the shadow of a light when it is what is shown. False: there is none, as no such light shines or no rays
+/// are cast. `fresh`: it does not go on with that of the frames before.
+fn record_light_shadow(
+    recorder: &mut Recorder,
+    scope: &Scope<'_>,
+    settings: &ViewSettings,
+    targets: &Targets,
+    passes: &PassSet,
+    fresh: bool,
+) -> Result<bool> {
+    let (Show::Shadow, Some(pass), Some(image)) =
+        (settings.show, &passes.light_shadow, &targets.light_shadow)
+    else {
+        return Ok(false);
+    };
+    let Some(light) = scope.tables.lights.index_of(settings.show_light) else { return Ok(false) };
+    pass.record(recorder, scope, (&targets.id, image), light, fresh)?;
+    Ok(true)
 }
 
 /// What kind of frame this is.

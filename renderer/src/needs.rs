@@ -185,7 +185,7 @@ pub struct Needs {
     pub temporal: bool,
     /// Motion vectors.
     pub motion: bool,
-    /// Spheres and boxes: false in the raster pipeline, which does not draw them.
+    /// Spheres and boxes.
     pub shapes: bool,
     /// Rays find the primary surfaces, not the rasteriser.
     pub primary_rays: bool,
@@ -193,6 +193,9 @@ pub struct Needs {
     pub lobes: bool,
     /// Paths carry the light, not the passes for shadow and shading.
     pub paths: bool,
+    /// The number of rays behind a surface is shown. What is shown is no need of the scene: false with `NeedsMode::All`
+    /// too, unless it is.
+    pub ray_depth: bool,
 }
 
 impl Needs {
@@ -225,10 +228,11 @@ impl Needs {
             shadow_rays: rays,
             temporal: settings.temporal && rays && !paths && (all || noisy),
             motion: all || settings.show == Show::Motion || (settings.temporal && rays && !paths && noisy),
-            shapes: rays && (all || scene.shapes),
+            shapes: all || scene.shapes,
             primary_rays: paths || settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
             paths,
             lobes: all || surfaces.lobes,
+            ray_depth: settings.show == Show::RayDepth,
         }
     }
 
@@ -258,6 +262,7 @@ impl Needs {
             self.motion,
             self.shapes,
             self.lobes,
+            self.ray_depth,
         ];
         Specialization {
             values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),
@@ -299,19 +304,11 @@ impl Needs {
             (self.emission, "emissive target", "no surface emits"),
             (self.motion, "motion vectors", "nothing is denoised over time"),
             (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),
-            (
-                self.shapes,
-                "spheres and boxes",
-                if rays {
-                    "every mesh is made of triangles"
-                } else {
-                    "rays alone meet them, and the raster pipeline casts none"
-                },
-            ),
+            (self.shapes, "spheres and boxes", "every mesh is made of triangles"),
             (
                 settings.pipeline != Pipeline::Hybrid || !self.primary_rays,
                 "raster of primary surfaces",
-                "the scene holds spheres or boxes, which rays alone meet",
+                "the scene holds spheres or boxes, which rays meet without drawing each",
             ),
             (
                 self.temporal,
@@ -407,7 +404,8 @@ mod tests {
 
     #[test]
     fn all_means_all() {
-        let settings = ViewSettings { needs: NeedsMode::All, ..ViewSettings::default() };
+        let settings =
+            ViewSettings { needs: NeedsMode::All, show: Show::RayDepth, ..ViewSettings::default() };
         let needs = Needs::of(&summary(&[rough()]), &settings);
         assert!(needs.left_out(&settings).is_empty());
         assert!(needs.specialization().values.iter().all(|(_, value)| *value == 1));

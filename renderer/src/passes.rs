@@ -7,6 +7,7 @@ mod deferred;
 mod deform;
 mod gbuffer;
 mod instance_descriptors;
+mod light_shadow;
 mod path_trace;
 mod post;
 mod shading;
@@ -28,8 +29,9 @@ pub(crate) use deferred::Deferred;
 pub(crate) use deform::Deform;
 pub(crate) use gbuffer::GBuffer;
 pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
+pub(crate) use light_shadow::LightShadow;
 pub(crate) use path_trace::PathTrace;
-pub(crate) use post::Post;
+pub(crate) use post::{Post, Shown};
 pub(crate) use shading::Shading;
 pub(crate) use shadow::Shadow;
 pub(crate) use shape_boxes::ShapeBoxes;
@@ -39,6 +41,7 @@ use crate::accel::Accel;
 use crate::error::Result;
 use crate::gpu_types::Push;
 use crate::needs::Needs;
+use crate::settings::Show;
 use crate::shader::{Compiled, ShaderLibrary, merge_interfaces};
 use crate::tables::Tables;
 
@@ -226,6 +229,8 @@ pub(crate) struct PassSet {
     pub(crate) gbuffer: GBuffer,
     pub(crate) radiance: Radiance,
     pub(crate) accumulate: Accumulate,
+    /// Made when it is shown for the first time.
+    pub(crate) light_shadow: Option<LightShadow>,
     pub(crate) post: Post,
 }
 
@@ -239,7 +244,16 @@ impl PassSet {
                 Radiance::Deferred(Deferred::new(builder)?)
             },
             accumulate: Accumulate::new(builder)?,
+            light_shadow: None,
             post: Post::new(builder)?,
         })
+    }
+
+    /// Makes what a view asks for and was not asked for before.
+    pub(crate) fn prepare(&mut self, builder: &mut Builder<'_>, show: Show, window: bool) -> Result<()> {
+        if show == Show::Shadow && builder.needs.shadow_rays && self.light_shadow.is_none() {
+            self.light_shadow = Some(LightShadow::new(builder)?);
+        }
+        self.post.prepare(builder, show, window)
     }
 }

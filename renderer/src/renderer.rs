@@ -276,7 +276,7 @@ impl Renderer {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => entry.insert(PassSet::new(&mut builder)?),
         };
-        passes.post.prepare(&mut builder, show, window)
+        passes.prepare(&mut builder, show, window)
     }
 
     /// Reads the accumulated image of a view. Waits for the device.

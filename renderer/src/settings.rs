@@ -1,6 +1,12 @@
 //! What a caller may choose for a view. Plain values; the editor's panel and the command line fill the same struct.
 
+mod show;
+
 use serde::{Deserialize, Serialize};
+
+pub use show::Show;
+
+use crate::delta::LightId;
 
 /// How an image is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -96,64 +102,6 @@ impl Sampler {
     }
 }
 
-/// What a view shows: the image, or one of the intermediate targets.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Show {
-    /// The finished image.
-    #[default]
-    Image,
-    /// Base colour.
-    BaseColor,
-    /// Shading normal in render space.
-    Normal,
-    /// Geometric normal in render space.
-    GeometricNormal,
-    /// Depth.
-    Depth,
-    /// Metalness.
-    Metallic,
-    /// Roughness.
-    Roughness,
-    /// Motion vectors.
-    Motion,
-    /// Emitted radiance.
-    Emissive,
-    /// A colour an instance.
-    Instance,
-    /// A colour a material.
-    Material,
-    /// A colour a triangle.
-    Triangle,
-    /// Direct diffuse light, demodulated.
-    DirectDiffuse,
-    /// Direct specular light, demodulated.
-    DirectSpecular,
-    /// Length of the temporal history.
-    History,
-}
-
-impl Show {
-    /// Everything that can be shown, in the order of menus, with its name.
-    pub const ALL: [(Self, &'static str); 15] = [
-        (Self::Image, "Image"),
-        (Self::BaseColor, "Base colour"),
-        (Self::Normal, "Shading normal"),
-        (Self::GeometricNormal, "Geometric normal"),
-        (Self::Depth, "Depth"),
-        (Self::Metallic, "Metallic"),
-        (Self::Roughness, "Roughness"),
-        (Self::Motion, "Motion"),
-        (Self::Emissive, "Emission"),
-        (Self::Instance, "Instances"),
-        (Self::Material, "Materials"),
-        (Self::Triangle, "Triangles"),
-        (Self::DirectDiffuse, "Direct diffuse light"),
-        (Self::DirectSpecular, "Direct specular light"),
-        (Self::History, "History length"),
-    ];
-}
-
 /// Whether pipelines are made for this scene or for any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -173,6 +121,8 @@ pub struct ViewSettings {
     pub pipeline: Pipeline,
     /// What is shown.
     pub show: Show,
+    /// The light of [`Show::Shadow`]; `None`: the first that shines.
+    pub show_light: Option<LightId>,
     /// Special or general variants.
     pub needs: NeedsMode,
     /// Exposure in stops; 0 leaves radiance 1 at 1.
@@ -210,6 +160,7 @@ impl Default for ViewSettings {
         Self {
             pipeline: Pipeline::Hybrid,
             show: Show::Image,
+            show_light: None,
             needs: NeedsMode::Auto,
             exposure_ev: 0.0,
             tone_map: ToneMap::Neutral,

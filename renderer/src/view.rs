@@ -14,7 +14,7 @@ pub(crate) use camera::CameraMatrices;
 pub(crate) use targets::Targets;
 
 use crate::accumulation::Accumulation;
-use crate::delta::{Camera, Invalidation};
+use crate::delta::{Camera, Invalidation, LightId};
 use crate::error::Result;
 use crate::gpu_types::AccumulatorPixel;
 use crate::measure::Statistics;
@@ -70,6 +70,7 @@ pub(crate) struct Displayed {
     exposure_ev: f32,
     tone_map: ToneMap,
     show: Show,
+    show_light: Option<LightId>,
     selection: Vec<u32>,
 }
 
@@ -159,6 +160,7 @@ impl View {
             exposure_ev: self.settings.exposure_ev,
             tone_map: self.settings.tone_map,
             show: self.settings.show,
+            show_light: self.settings.show_light,
             selection: self.selection.clone(),
         }
     }
@@ -271,6 +273,9 @@ impl View {
             let targets = Targets::new(&self.device, self.extent, &needs, self.window)?;
             self.targets = Some((wanted, targets));
         }
+        if let Some((_, targets)) = &mut self.targets {
+            targets.prepare_shown(&self.device, self.extent, self.settings.show)?;
+        }
         if self.accumulator.is_none() {
             let pixels = u64::from(self.extent[0]) * u64::from(self.extent[1]);
             self.accumulator = Some(Buffer::new(
@@ -293,6 +298,7 @@ fn invalidation_of(old: &ViewSettings, new: &ViewSettings) -> Invalidation {
         exposure_ev: new.exposure_ev,
         tone_map: new.tone_map,
         show: new.show,
+        show_light: new.show_light,
         needs: new.needs,
         ..old.clone()
     };
@@ -311,6 +317,7 @@ mod tests {
             exposure_ev: 2.0,
             tone_map: ToneMap::Aces,
             show: Show::Normal,
+            show_light: Some(LightId { node: 3, part: 0 }),
             needs: NeedsMode::All,
             ..old.clone()
         };

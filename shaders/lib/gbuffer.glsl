@@ -31,7 +31,8 @@ vec4 gbuffer_uv_gradient(vec2 edge1, vec2 edge2, vec2 right, vec2 down) {
 vec2 gbuffer_shape_uv_step(PlacedShape shape, ShapePlace place, CameraRay ray) {
     vec3 origin = ray.origin;
     vec3 direction = ray.direction;
-    if (!shape_line(shape, origin, direction)) {
+    float speed;
+    if (!shape_line(shape, origin, direction, speed)) {
         return vec2(0.0);
     }
     vec3 along = origin + (dot(place.unit - origin, place.normal) / dot(direction, place.normal)) * direction - place.unit;

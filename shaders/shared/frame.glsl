@@ -33,6 +33,16 @@ const uint SHOW_HISTORY = 10u;          // source: history_diffuse or history_sp
 const uint SHOW_OCCLUSION = 11u;        // source: gbuffer_base_color
 const uint SHOW_MATERIAL = 12u;         // source_uint: gbuffer_id
 const uint SHOW_TRIANGLE = 13u;         // source_uint: gbuffer_id
+const uint SHOW_PRIMITIVE = 14u;        // source_uint: gbuffer_id
+const uint SHOW_FACING = 15u;           // source_uint: gbuffer_id
+const uint SHOW_RAY_DEPTH = 16u;        // source_uint: ray_depth
+const uint SHOW_SHADOW = 17u;           // source: light_shadow
+// Push.argument0 of post/show_surface.comp.
+const uint SHOW_WIREFRAME = 18u;
+const uint SHOW_BARYCENTRIC = 19u;
+
+// Bit of Push.argument0 of pass light_shadow, beside the number of the light: what the image holds is forgotten.
+const uint LIGHT_SHADOW_FRESH = 0x80000000u;
 
 struct Frame {
     mat4 clip_from_render;              // jittered; reverse depth, far plane at infinity (1 at near, 0 at infinity)

@@ -48,6 +48,9 @@ const uint GEOMETRY_SHAPES = 4u;    // spheres and boxes: `positions` is the add
 const uint SHAPE_SPHERE = 0u;
 const uint SHAPE_BOX = 1u;
 
+// Vertices that raster draws for a shape: the box around it.
+const uint SHAPE_VERTICES = 36u;
+
 // Light.kind
 const uint LIGHT_POINT = 0u;
 const uint LIGHT_SPOT = 1u;

@@ -197,6 +197,28 @@ fn every_pipeline_and_target_can_be_asked_for() {
 }
 
 #[test]
+fn the_shadow_of_a_light_is_chosen_by_name_or_number() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let shot = |output: &str, light: &[&str]| {
+        let mut args = vec!["-o", output, "--samples", "1", "--show", "shadow"];
+        args.extend(light);
+        render(folder.path(), &gallery(), &args)
+    };
+    for (output, light) in [("1.png", "1"), ("2.png", "2"), ("sun.png", "Sun")] {
+        let run = shot(output, &["--show-light", light]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+    }
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect("an image");
+    assert_ne!(bytes("1.png"), bytes("2.png"));
+    assert!(bytes("sun.png") == bytes("1.png") || bytes("sun.png") == bytes("2.png"));
+    for unknown in ["Moon", "0", "99"] {
+        let run = shot("no.png", &["--show-light", unknown]);
+        assert_eq!(run.code, Some(1), "{unknown}");
+        assert!(run.stderr.contains("Sun"), "the message names those that there are: {}", run.stderr);
+    }
+}
+
+#[test]
 fn a_constant_environment_comes_from_the_command_line() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("far.obj"), "v 0 0 -1e3\nv 1e-3 0 -1e3\nv 0 1e-3 -1e3\nf 1 2 3\n")

@@ -237,6 +237,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         primary_rays: false,
         paths: false,
         lobes: false,
+        ray_depth: false,
     };
     let cases = [
         ("LIGHTS", Needs { lights: true, ..nothing }),
@@ -252,6 +253,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         ("MOTION", Needs { motion: true, ..nothing }),
         ("SHAPES", Needs { shapes: true, ..nothing }),
         ("LOBES", Needs { lobes: true, ..nothing }),
+        ("RAY_DEPTH", Needs { ray_depth: true, ..nothing }),
     ];
     let text = shader_text("shared/needs.glsl");
     let count = text.matches("constant_id").count();

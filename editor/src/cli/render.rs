@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
+use caustica_renderer::delta::LightId;
 use caustica_renderer::{NeedsMode, Pipeline, Sampler, Show, ToneMap, ViewSettings};
 use caustica_scene::Edit;
 use clap::{ArgGroup, Args, ValueEnum};
@@ -82,9 +83,12 @@ pub(super) struct RenderArgs {
     /// Tone map of a PNG
     #[arg(long, value_enum)]
     tone_map: Option<ToneMapArg>,
-    /// What a PNG shows: the image, or an intermediate target such as base_color, normal, depth
-    #[arg(long, value_name = "TARGET", value_parser = parse_show)]
+    /// What a PNG shows: the image, or a step on the way such as base_color, normal, depth
+    #[arg(long, value_name = "VIEW", value_parser = parse_show, long_help = show_help())]
     show: Option<Show>,
+    /// The light of `--show shadow`: its name, or its number from 1; without it the first that shines
+    #[arg(long, value_name = "NAME|N")]
+    show_light: Option<String>,
     /// Print one JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -163,12 +167,35 @@ fn parse_output(text: &str) -> Result<PathBuf, String> {
 
 fn parse_show(text: &str) -> Result<Show, String> {
     serde_json::from_value(json!(text)).map_err(|_| {
-        let names: Vec<String> = Show::ALL
-            .iter()
-            .filter_map(|(show, _)| serde_json::to_value(show).ok()?.as_str().map(str::to_owned))
-            .collect();
+        let names: Vec<String> = show_names().map(|(_, name)| name).collect();
         format!("one of {}", names.join(", "))
     })
+}
+
+/// Every view with its name on the command line.
+fn show_names() -> impl Iterator<Item = (Show, String)> {
+    let name = |show| serde_json::to_value(show).ok()?.as_str().map(str::to_owned);
+    Show::ALL.into_iter().filter_map(move |(show, _)| Some((show, name(show)?)))
+}
+
+fn show_help() -> String {
+    let lines: Vec<String> =
+        show_names().map(|(show, name)| format!("  {name:16} {}", show.meaning())).collect();
+    format!("What a PNG shows: the image, or a step on the way:\n{}", lines.join("\n"))
+}
+
+/// The light that `--show-light` names.
+fn light_of(session: &Session, name: &str) -> anyhow::Result<LightId> {
+    let lights = session.light_names();
+    let by_number = || name.parse::<usize>().ok()?.checked_sub(1).and_then(|index| lights.get(index));
+    match lights.iter().find(|(_, light)| light == name).or_else(by_number) {
+        Some((id, _)) => Ok(*id),
+        None if lights.is_empty() => bail!("--show-light '{name}': the scene has no light"),
+        None => {
+            let known: Vec<&str> = lights.iter().map(|(_, light)| light.as_str()).collect();
+            bail!("--show-light '{name}': no such light; there is: {}", known.join(", "))
+        }
+    }
 }
 
 /// Renders the file.
@@ -205,7 +232,9 @@ pub(super) fn run(
         }
         session.set_camera(ViewCamera::of_document(session.document(), Some(name), 1.0));
     }
-    session.set_settings(settings_of(args, session.settings().clone()));
+    let show_light = args.show_light.as_deref().map(|name| light_of(&session, name)).transpose()?;
+    let settings = settings_of(args, session.settings().clone());
+    session.set_settings(ViewSettings { show_light, ..settings });
     session.set_sample_target(sample_limit(args))?;
     if args.sample_offset > 0 {
         session.set_sample_offset(args.sample_offset)?;

@@ -1,16 +1,18 @@
 //! Settings of the picture: environment, pipeline, exposure, sampling. Enters and leaves: the view's settings.
 
+use caustica_renderer::delta::LightId;
 use caustica_renderer::{NeedsMode, Pipeline, Sampler, Sampling, Show, ToneMap, ViewSettings};
 use egui::{DragValue, Slider, Ui};
 
 use super::{Cx, field, section};
+use crate::session::Session;
 
 /// Draws the panel.
 pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
     section(ui, "Environment", |ui| super::environment::ui(cx, ui));
     let old = cx.session.settings().clone();
     let mut new = old.clone();
-    section(ui, "Picture", |ui| picture(ui, &mut new));
+    section(ui, "Picture", |ui| picture(cx.session, ui, &mut new));
     section(ui, "Sampling", |ui| sampling(ui, &mut new));
     section(ui, "While moving", |ui| moving(cx, ui, &mut new));
     if new != old {
@@ -34,11 +36,34 @@ pub fn pipeline_menu(ui: &mut Ui, pipeline: &mut Pipeline) {
 /// A menu of what is shown.
 pub fn show_menu(ui: &mut Ui, show: &mut Show) {
     let name = Show::ALL.iter().find(|(choice, _)| choice == show).map_or("", |(_, name)| name);
-    egui::ComboBox::from_id_salt("show").selected_text(name).width(128.0).height(420.0).show_ui(ui, |ui| {
-        for (choice, name) in Show::ALL {
-            ui.selectable_value(show, choice, name);
-        }
-    });
+    egui::ComboBox::from_id_salt("show")
+        .selected_text(name)
+        .width(128.0)
+        .height(420.0)
+        .show_ui(ui, |ui| {
+            for (choice, name) in Show::ALL {
+                ui.selectable_value(show, choice, name).on_hover_text(choice.meaning());
+            }
+        })
+        .response
+        .on_hover_text(show.meaning());
+}
+
+/// A menu of the lights whose shadow can be shown; `None` is the first that shines.
+pub fn light_menu(session: &Session, ui: &mut Ui, light: &mut Option<LightId>) {
+    let lights = session.light_names();
+    let chosen = lights.iter().find(|(id, _)| light.is_none_or(|light| light == *id));
+    let name = chosen.map_or("no light", |(_, name)| name);
+    egui::ComboBox::from_id_salt("shadow of")
+        .selected_text(name)
+        .width(104.0)
+        .show_ui(ui, |ui| {
+            for (id, name) in &lights {
+                ui.selectable_value(light, Some(*id), name);
+            }
+        })
+        .response
+        .on_hover_text("The light whose shadow is shown");
 }
 
 fn pipeline_name(pipeline: Pipeline) -> String {
@@ -59,9 +84,14 @@ fn pipeline_tip(pipeline: Pipeline) -> &'static str {
     }
 }
 
-fn picture(ui: &mut Ui, settings: &mut ViewSettings) {
+fn picture(session: &Session, ui: &mut Ui, settings: &mut ViewSettings) {
     field(ui, "Pipeline", "How the picture is made", |ui| pipeline_menu(ui, &mut settings.pipeline));
     field(ui, "Show", "The finished picture or a step on the way", |ui| show_menu(ui, &mut settings.show));
+    if settings.show == Show::Shadow {
+        field(ui, "Light", "The light whose shadow is shown", |ui| {
+            light_menu(session, ui, &mut settings.show_light);
+        });
+    }
     field(ui, "Exposure", "Stops: each doubles the light. The picture is not rendered anew", |ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - 96.0).clamp(32.0, 160.0);
         ui.add(

@@ -57,6 +57,9 @@ pub const SHAPE_SPHERE: u32 = 0;
 /// [`super::Shape::kind`].
 pub const SHAPE_BOX: u32 = 1;
 
+/// Vertices that raster draws for a shape: the box around it.
+pub const SHAPE_VERTICES: u32 = 36;
+
 /// Bit of an instance mask: met by camera rays.
 pub const MASK_CAMERA: u32 = 1;
 /// Bit of an instance mask: met by shadow rays.
@@ -122,6 +125,22 @@ pub const SHOW_OCCLUSION: u32 = 11;
 pub const SHOW_MATERIAL: u32 = 12;
 /// Debug view: source_uint = id target.
 pub const SHOW_TRIANGLE: u32 = 13;
+/// Debug view: source_uint = id target.
+pub const SHOW_PRIMITIVE: u32 = 14;
+/// Debug view: source_uint = id target.
+pub const SHOW_FACING: u32 = 15;
+/// Debug view: source_uint = ray depth.
+pub const SHOW_RAY_DEPTH: u32 = 16;
+/// Debug view: source = shadow of one light.
+pub const SHOW_SHADOW: u32 = 17;
+/// Debug view of `show_surface`: edges.
+pub const SHOW_WIREFRAME: u32 = 18;
+/// Debug view of `show_surface`: barycentric coordinates.
+pub const SHOW_BARYCENTRIC: u32 = 19;
+
+/// Bit of [`super::Push::argument0`] of pass `light_shadow`, beside the number of the light: what its image holds is
+/// forgotten.
+pub const LIGHT_SHADOW_FRESH: u32 = 0x8000_0000;
 
 /// Sampler: Owen-scrambled Sobol.
 pub const SAMPLER_SOBOL: u32 = 0;

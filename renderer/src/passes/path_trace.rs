@@ -19,7 +19,11 @@ impl PathTrace {
 
     /// Fills `shaded`.
     pub(crate) fn record(&self, recorder: &mut Recorder, scope: &Scope<'_>, targets: &Targets) -> Result<()> {
-        let binds = [("gbuffer_id", Bind::Image(&targets.id)), ("shaded", Bind::Image(&targets.shaded))];
+        let binds = [
+            ("gbuffer_id", Bind::Image(&targets.id)),
+            ("shaded", Bind::Image(&targets.shaded)),
+            ("ray_depth", Bind::Image(&targets.ray_depth)),
+        ];
         scope.rays(recorder, "path_trace", &self.pipeline, &binds, scope.rows.clone(), 0)
     }
 }

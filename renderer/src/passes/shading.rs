@@ -41,6 +41,7 @@ impl Shading {
             ("direct_diffuse", Bind::Image(diffuse)),
             ("direct_specular", Bind::Image(specular)),
             ("shaded", Bind::Image(&targets.shaded)),
+            ("ray_depth", Bind::Image(&targets.ray_depth)),
         ];
         let has_light = u32::from(light.is_some());
         match self {

@@ -181,7 +181,8 @@ void add_environment_light(inout DirectLight sum, Scene scene, Receiver receiver
     vec2 point_xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 2u));
     float strategy_xi = by_map ? sample_1d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 0u)) : 1.0;
     vec2 cell_xi = by_map ? sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 1u)) : vec2(0.0);
-    LightRay ray = environment_ray(scene, receiver.surface, receiver.render_from_local, strategy_xi, cell_xi, point_xi);
+    LightRay ray = environment_ray(scene, receiver.surface, receiver.render_from_local, MAP_SHARE_ALONE, strategy_xi, cell_xi,
+        point_xi);
     float specular_share = receiver.lobe_traced ? 0.0 : 1.0;
 #ifdef LIGHT_WITHOUT_RAYS
     ray.irradiance *= receiver.surface.occlusion;

@@ -85,22 +85,27 @@ bool environment_by_map(Scene scene) {
     return NEEDS_ENVIRONMENT_MAP && scene.environment_width > 0u;
 }
 
+// Share of the directions of environment_ray that the map's table draws. Where something else draws the surface's lobes as well and is weighted
+// against it, all of them.
+const float MAP_SHARE_ALONE = 0.5;
+const float MAP_SHARE_WITH_LOBES = 1.0;
+
 // Density of environment_ray, 1/sr.
-float environment_ray_pdf(Scene scene, vec3 normal, vec3 direction) {
+float environment_ray_pdf(Scene scene, vec3 normal, vec3 direction, float map_share) {
     float pdf = cosine_pdf(dot(direction, normal));
-    return environment_by_map(scene) ? 0.5 * (pdf + environment_pdf(scene, direction)) : pdf;
+    return environment_by_map(scene) ? mix(pdf, environment_pdf(scene, direction), map_share) : pdf;
 }
 
 // One direction: from the cosine lobe about the shading normal (the third column), or for a map by turns from that and the map's alias table,
 // weighted by the balance heuristic over both (one-sample model: Veach 1997, section 9.2.4). strategy_xi and cell_xi are for maps only.
-LightRay environment_ray(Scene scene, Surface surface, mat3 render_from_local, float strategy_xi, vec2 cell_xi, vec2 point_xi) {
+LightRay environment_ray(Scene scene, Surface surface, mat3 render_from_local, float map_share, float strategy_xi, vec2 cell_xi, vec2 point_xi) {
     LightRay ray;
-    if (environment_by_map(scene) && strategy_xi < 0.5) {
+    if (environment_by_map(scene) && strategy_xi < map_share) {
         ray.direction = environment_sample(scene, cell_xi, point_xi);
     } else {
         ray.direction = render_from_local * cosine_sample(point_xi);
     }
-    ray.pdf = environment_ray_pdf(scene, surface.shading_normal, ray.direction);
+    ray.pdf = environment_ray_pdf(scene, surface.shading_normal, ray.direction, map_share);
     ray.irradiance = ray.pdf > 0.0 ? environment_radiance(scene, ray.direction) / ray.pdf : vec3(0.0);
     ray.origin = surface_spawn(surface, ray.direction);
     ray.along = ray.direction;

@@ -122,84 +122,89 @@ float balance(float count, float pdf, float other_pdf) {
     return sum > 0.0 ? count * pdf / sum : 0.0;
 }
 
-void add_punctual_light(inout DirectLight sum, Receiver receiver, Light light, uint pair, uint rays, float weight, bool shares_lobe) {
-    for (uint i = 0u; i < rays; ++i) {
-        Sequence sequence = sequence_split(receiver.sequence, rays, i);
-        vec2 xi = sample_2d(sequence, receiver_dimension(receiver, PURPOSE_LIGHT_POINT, pair));
-        LightSample s = light_sample(light, receiver.surface.position, xi);
-        float specular_share = 1.0;
-        if (shares_lobe && s.pdf > 0.0) {
-            float lobe_pdf = brdf_pdf_specular(receiver.brdf, receiver.v, s.direction * receiver.render_from_local);
-            specular_share = balance(float(rays), s.pdf, lobe_pdf);
-        }
-        DirectLight reflected = receiver_reflect(receiver, s.direction, s.irradiance * (weight / float(rays)), specular_share);
-        add_light(sum, reflected, surface_spawn(receiver.surface, s.direction), s.direction, s.distance_m,
-            visibility_seed(receiver, pair * rays + i));
-    }
-}
+// One drawn direction, before the surface does anything with it.
+struct DrawnLight {
+    LightRay ray;
+    float specular_share;   // of the light that the traced lobe does not bring
+    uint salt;              // names its random numbers
+};
 
-// All lights when there are at most `draws`, else `draws` of them drawn by power.
-void add_punctual_lights(inout DirectLight sum, Scene scene, Receiver receiver, uint draws, uint rays) {
-    if (!NEEDS_LIGHTS) {
-        return;
-    }
+// Shadow ray `which` of all those to punctual lights: `rays` to every light, or to each of `draws` lights drawn by power.
+DrawnLight punctual_light(Scene scene, Receiver receiver, uint which, uint draws, uint rays) {
+    bool visits_all = visits_all_lights(scene, draws);
+    uint pair = which / rays;
+    uint number = pair;
+    float weight = 1.0;
     LightTable lights = LightTable(scene.lights);
-    if (visits_all_lights(scene, draws)) {
-        for (uint i = 0u; i < scene.light_count; ++i) {
-            add_punctual_light(sum, receiver, lights.at[i], i, rays, 1.0, receiver.lobe_traced && LOBE_MEETS_LIGHTS);
-        }
-        return;
+    if (!visits_all) {
+        number = alias_draw(scene.light_alias, scene.light_count, sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_LIGHT_CHOICE, pair)));
+        float chance = lights.at[number].selection_pdf;
+        weight = chance > 0.0 ? 1.0 / (chance * float(draws)) : 0.0;
     }
-    for (uint i = 0u; i < draws; ++i) {
-        vec2 xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_LIGHT_CHOICE, i));
-        Light light = lights.at[alias_draw(scene.light_alias, scene.light_count, xi)];
-        if (light.selection_pdf > 0.0) {
-            add_punctual_light(sum, receiver, light, i, rays, 1.0 / (light.selection_pdf * float(draws)), false);
-        }
+    Sequence sequence = sequence_split(receiver.sequence, rays, which % rays);
+    vec2 xi = sample_2d(sequence, receiver_dimension(receiver, PURPOSE_LIGHT_POINT, pair));
+    LightSample s = light_sample(lights.at[number], receiver.surface.position, xi);
+    float specular_share = 1.0;
+    if (visits_all && receiver.lobe_traced && LOBE_MEETS_LIGHTS && s.pdf > 0.0) {
+        float lobe_pdf = brdf_pdf_specular(receiver.brdf, receiver.v, s.direction * receiver.render_from_local);
+        specular_share = balance(float(rays), s.pdf, lobe_pdf);
     }
+    LightRay ray = LightRay(s.direction, s.irradiance * (weight / float(rays)), s.pdf, surface_spawn(receiver.surface, s.direction), s.direction,
+        s.distance_m);
+    return DrawnLight(ray, specular_share, which);
 }
 
-#ifndef SURFACE_GRADIENTS
-void add_emissive_light(inout DirectLight sum, Scene scene, Receiver receiver) {
-    if (!NEEDS_EMISSIVE_LIGHTS || scene.emissive_count == 0u) {
-        return;
-    }
+DrawnLight emissive_light(Scene scene, Receiver receiver) {
     vec2 choice = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_EMISSIVE, 0u));
     vec2 xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_EMISSIVE, 1u));
-    LightRay ray = emissive_ray(scene, receiver.surface, choice, xi);
-    float specular_share = receiver.lobe_traced && LOBE_MEETS_LIGHTS ? 0.0 : 1.0;
-    DirectLight reflected = receiver_reflect(receiver, ray.direction, ray.irradiance, specular_share);
-    add_light(sum, reflected, ray.origin, ray.along, ray.t_max_m, visibility_seed(receiver, 4094u));
+    return DrawnLight(emissive_ray(scene, receiver.surface, choice, xi), receiver.lobe_traced && LOBE_MEETS_LIGHTS ? 0.0 : 1.0, 4094u);
 }
-#endif
 
-void add_environment_light(inout DirectLight sum, Scene scene, Receiver receiver) {
-    if (!NEEDS_ENVIRONMENT) {
-        return;
-    }
+DrawnLight environment_light(Scene scene, Receiver receiver) {
     bool by_map = environment_by_map(scene);
     vec2 point_xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 2u));
     float strategy_xi = by_map ? sample_1d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 0u)) : 1.0;
     vec2 cell_xi = by_map ? sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 1u)) : vec2(0.0);
     LightRay ray = environment_ray(scene, receiver.surface, receiver.render_from_local, MAP_SHARE_ALONE, strategy_xi, cell_xi,
         point_xi);
-    float specular_share = receiver.lobe_traced ? 0.0 : 1.0;
 #ifdef LIGHT_WITHOUT_RAYS
     ray.irradiance *= receiver.surface.occlusion;
 #endif
-    DirectLight reflected = receiver_reflect(receiver, ray.direction, ray.irradiance, specular_share);
-    add_light(sum, reflected, ray.origin, ray.along, ray.t_max_m, visibility_seed(receiver, 4095u));
+    return DrawnLight(ray, receiver.lobe_traced ? 0.0 : 1.0, 4095u);
 }
 
-// draws: lights visited; rays: shadow rays to each of them.
+// draws: lights visited; rays: shadow rays to each of them. One loop over all kinds of lamps: compilers copy what is called into every place that
+// calls it, and the model of the surface is long.
 DirectLight direct_light(Scene scene, Receiver receiver, uint draws, uint rays) {
     DirectLight sum = DirectLight(vec3(0.0), vec3(0.0));
     if (receiver.surface.mode != MODE_PBR || receiver.v.z <= 0.0) {
         return sum; // perfect mirrors and smooth glass: only the traced rays carry light
     }
-    add_punctual_lights(sum, scene, receiver, draws, max(rays, 1u));
-    add_emissive_light(sum, scene, receiver);
-    add_environment_light(sum, scene, receiver);
+    rays = max(rays, 1u);
+    uint punctual = 0u;
+    if (NEEDS_LIGHTS) {
+        punctual = (visits_all_lights(scene, draws) ? scene.light_count : draws) * rays;
+    }
+    uint emissive = 0u;
+    if (NEEDS_EMISSIVE_LIGHTS) {
+        emissive = min(scene.emissive_count, 1u);
+    }
+    uint environment = 0u;
+    if (NEEDS_ENVIRONMENT) {
+        environment = 1u;
+    }
+    for (uint i = 0u; i < punctual + emissive + environment; ++i) {
+        DrawnLight drawn;
+        if (NEEDS_LIGHTS && i < punctual) {
+            drawn = punctual_light(scene, receiver, i, draws, rays);
+        } else if (NEEDS_EMISSIVE_LIGHTS && i < punctual + emissive) {
+            drawn = emissive_light(scene, receiver);
+        } else {
+            drawn = environment_light(scene, receiver);
+        }
+        DirectLight reflected = receiver_reflect(receiver, drawn.ray.direction, drawn.ray.irradiance, drawn.specular_share);
+        add_light(sum, reflected, drawn.ray.origin, drawn.ray.along, drawn.ray.t_max_m, visibility_seed(receiver, drawn.salt));
+    }
     return sum;
 }
 

@@ -21,7 +21,7 @@ MADE_BY = "projects/lectures.py"
 UNLIT = {"KHR_materials_unlit": {}}
 
 CORAL, AMBER, TEAL, BLUE = (0.80, 0.20, 0.13), (0.85, 0.47, 0.07), (0.05, 0.42, 0.38), (0.08, 0.20, 0.60)
-CREAM, BRASS, STEEL = (0.76, 0.70, 0.60), (0.89, 0.66, 0.34), (0.62, 0.61, 0.59)
+CREAM, BRASS = (0.76, 0.70, 0.60), (0.89, 0.66, 0.34)
 
 
 # ---- files ------------------------------------------------------------------------------------
@@ -409,17 +409,17 @@ def anti_aliasing():
             tiles[(i + j) % 2].add(shapes.plane((0.5 * i, 0, 0.5 * j + 0.5), (0.5, 0, 0), (0, 0, -0.5), no_uv))
     put(f, "Light tiles", tiles[0], f.material("Ivory", (0.80, 0.77, 0.70), roughness=0.9))
     put(f, "Dark tiles", tiles[1], f.material("Slate", (0.06, 0.09, 0.14), roughness=0.9))
-    white = f.material("White paint", (0.85, 0.85, 0.83), roughness=0.5)
+    steel = f.material("Dark steel", (0.03, 0.04, 0.07), roughness=0.4)
     wheel = f.node("Wheel", translation=[0.55, 1.95, -1.2], rotation=[0, 0.2164396, 0, 0.976296])
     rims = upright(ring(1.5, 0.028)).add(upright(ring(1.36, 0.014)))
-    put(f, "Rims", rims, white, wheel)
+    put(f, "Rims", rims, steel, wheel)
     spokes, cabins = Shape(), [Shape() for _ in range(4)]
     for i in range(48):
         c, s = math.cos(2 * math.pi * i / 48), math.sin(2 * math.pi * i / 48)
         spokes.add(rod((0.12 * c, 0.12 * s, 0.0), (1.5 * c, 1.5 * s, 0.0), 0.006))
         if i % 4 == 0:
             cabins[i // 4 % 4].add(shapes.rounded_box((0.2, 0.2, 0.2), 0.04), (1.5 * c, 1.5 * s - 0.16, 0.0))
-    put(f, "Spokes", spokes, white, wheel)
+    put(f, "Spokes", spokes, steel, wheel)
     put(f, "Hub", upright(lathe([(0.0, -0.1), (0.14, -0.1), (0.14, 0.1), (0.0, 0.1)], 48, smooth=False)), f.material("Hub", CORAL, roughness=0.4), wheel)
     for name, paint, shape in zip(("Coral", "Amber", "Teal", "Blue"), (CORAL, AMBER, TEAL, BLUE), cabins):
         put(f, f"{name} cabins", shape, f.material(name, paint, roughness=0.4), wheel)
@@ -427,7 +427,7 @@ def anti_aliasing():
     for z in (-0.22, 0.22):
         for x in (-0.75, 0.75):
             legs.add(rod((0.0, 0.0, z), (x, -1.95, 2.2 * z), 0.03))
-    put(f, "Legs", legs, white, wheel)
+    put(f, "Legs", legs, steel, wheel)
     camera(f, (-0.6, 0.85, 4.4), (0.15, 1.45, -1.2), 40)
     sun(f, (-0.6, 0.9, 0.7), (1.0, 0.95, 0.86), 2.6, 0.5)
     write(f, (0.42, 0.58, 0.80), {"pipeline": "raytraced"})
@@ -444,15 +444,15 @@ def soft_shadows():
         put(f, f"Divider at {x}", box((x - 0.04, 0, -1.0), (x + 0.04, 3.2, 1.9)), plaster)
     cage = Shape()
     for i in range(12):
-        c, s = 0.3 * math.cos(2 * math.pi * i / 12), 0.3 * math.sin(2 * math.pi * i / 12)
-        cage.add(rod((c, 0.0, s), (c, 1.3, s), 0.016))
-    cage.add(ring(0.3, 0.024), (0, 1.3, 0)).add(ring(0.3, 0.024), (0, 0.65, 0))
+        c, s = 0.4 * math.cos(2 * math.pi * i / 12), 0.4 * math.sin(2 * math.pi * i / 12)
+        cage.add(rod((c, 0.0, s), (c, 1.5, s), 0.018))
+    cage.add(ring(0.4, 0.028), (0, 1.5, 0)).add(ring(0.4, 0.028), (0, 0.75, 0))
     glow = f.material("Glow", (1.0, 0.93, 0.80), extensions=UNLIT)
     bulbs = []
     for name, x, radius, paint in (("Point", -2, 0.0, CORAL), ("Small lamp", 0, 0.07, AMBER), ("Large lamp", 2, 0.25, TEAL)):
         paint = f.material(f"{name} paint", paint, roughness=0.4)
         put(f, f"{name}: cage", cage, paint, translation=[x, 0, 0.05])
-        put(f, f"{name}: ball", ball(0.17), paint, translation=[x, 0.17, 0.05])
+        put(f, f"{name}: ball", ball(0.24), paint, translation=[x, 0.24, 0.05])
         at = [x - 0.45, 2.35, 1.15]
         bulbs.append(f"{name}: bulb")
         put(f, bulbs[-1], ball(max(radius, 0.02)), glow, translation=at)

@@ -52,8 +52,8 @@ impl Experiment {
     fn read(text_before: &str, diff: &str) -> Self {
         let words: Vec<&str> = text_before.split('`').collect();
         let quoted: Vec<&str> = words.iter().skip(1).step_by(2).copied().collect();
-        let at =
-            quoted.iter().rposition(|word| word.starts_with("shaders/")).expect("the name of a shader file");
+        let at = quoted.iter().rposition(|word| word.starts_with("shaders/"));
+        let at = at.unwrap_or_else(|| panic!("no shader file is named before:{diff}"));
         let of =
             |mark: char| diff.lines().filter_map(|line| line.strip_prefix(mark)).map(str::to_owned).collect();
         Self {

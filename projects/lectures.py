@@ -147,7 +147,7 @@ def rod(a, b, radius, sides=8):
             turn = 2 * math.pi * (i % sides) / sides
             normal = tuple(math.cos(turn) * s - math.sin(turn) * u for s, u in zip(side, up))
             out.vertex(add(end, tuple(radius * n for n in normal)), normal, (0.0, 0.0))
-    out.grid(sides, 1, flip=shapes.dot(shapes.cross(up, side), along) > 0)
+    out.grid(sides, 1)
     return out
 
 
@@ -240,7 +240,7 @@ def camera_rays():
     for x, z in ((-0.45, 0.0), (0.25, 0.4), (0.25, -0.4)):
         tripod.add(rod((EYE[0] - 0.33, 0.8, 0), (EYE[0] - 0.33 + x, 0.0, z), 0.022))
     put(f, "Tripod", tripod, black)
-    camera(f, (-3.2, 2.5, 3.6), (-0.35, 0.72, 0.1), 35)
+    camera(f, (-3.2, 2.5, 3.9), (-0.55, 0.70, 0.1), 39)
     camera(f, EYE, add(EYE, (1.0, 0.0, 0.0)), math.degrees(2 * math.atan(4.5 * step / PLANE_M)), "Pinhole")
     sun(f, (-0.5, 1.0, 0.6), (1.0, 0.95, 0.87), 2.2, 1.5)
     write(f, (0.45, 0.50, 0.58), {"pipeline": "raytraced"}, ["Rays", "Image plane"])
@@ -266,7 +266,7 @@ def vertex_data():
     f = lecture(3, "vertex-data")
     backdrop(f, (0.74, 0.72, 0.70))
     outer = curve([(0.24, 0.0), (0.40, 0.30), (0.47, 0.62), (0.30, 0.98), (0.17, 1.20), (0.25, 1.42)], 2)
-    vase = lathe([(0.0, 0.0)] + outer, 14, (6.0, 5.0)).add(lathe([(0.25, 1.42), (0.15, 1.20), (0.0, 1.10)], 14))
+    vase = lathe([(0.0, 0.0)] + outer, 14, (6.0, 5.0)).add(lathe([(0.25, 1.42), (0.22, 1.415), (0.11, 1.20), (0.0, 1.10)], 14))
     grey = f.material("Clay", (0.62, 0.56, 0.50), roughness=0.4)
     white = f.material("Glaze", (1.0, 1.0, 1.0), roughness=0.4)
     checker(f)
@@ -281,7 +281,7 @@ def vertex_data():
     put(f, "Normals", vase, grey, translation=[-0.7, 0, 0])
     put(f, "Colours", vase, white, colors=[hue(p) for p in vase.positions], translation=[0.7, 0, 0])
     put(f, "Texture coordinates", vase, tiled, translation=[2.1, 0, 0])
-    camera(f, (0.0, 1.85, 6.2), (0.0, 0.72, 0.0), 24)
+    camera(f, (0.0, 1.95, 6.6), (0.0, 0.70, 0.0), 27)
     sun(f, (-0.8, 1.0, 0.8), (1.0, 0.94, 0.86), 2.4, 2.0)
     write(f, (0.42, 0.45, 0.50), {"pipeline": "raytraced"})
 
@@ -392,11 +392,11 @@ def reflections():
         for y, z, height, depth in ((0.06, 0, 0.12, 2.7), (2.26, 0, 0.12, 2.7), (1.16, -1.32, 2.2, 0.06), (1.16, 1.32, 2.2, 0.06)):
             bars.add(box((x - 0.04, y - height / 2, z - depth / 2), (x + 0.04, y + height / 2, z + depth / 2)))
         put(f, f"{name} frame", bars, frame)
-    for name, radius, paint, x, z in (("Coral ball", 0.30, CORAL, 0.35, -0.55), ("Blue ball", 0.22, BLUE, -0.25, 0.05), ("Amber ball", 0.16, AMBER, 0.55, 0.30)):
+    for name, radius, paint, x, z in (("Coral ball", 0.30, CORAL, 0.55, -0.45), ("Blue ball", 0.22, BLUE, 0.05, 0.05), ("Amber ball", 0.16, AMBER, 0.75, 0.30)):
         put(f, name, ball(radius), f.material(name, paint, roughness=0.6), translation=[x, radius, z])
-    put(f, "Chrome ball", ball(0.26), silver, translation=[-0.45, 0.26, -0.75])
+    put(f, "Chrome ball", ball(0.26), silver, translation=[0.15, 0.26, -0.90])
     lamp(f, "Lamp", (0.0, 2.6, 0.2), (1.0, 0.93, 0.82), 14.0, 0.12)
-    camera(f, (-1.22, 1.25, 0.95), (0.75, 0.68, -0.30), 58)
+    camera(f, (-1.28, 1.35, 0.75), (1.2, 0.66, -0.25), 58)
     write(f, (0.16, 0.20, 0.28), {"pipeline": "raytraced", "max_depth": 32})
 
 
@@ -482,7 +482,7 @@ def cornell_box():
     put(f, "Right wall", shapes.plane((1, 0, -1), (0, 0, 2), (0, 2, 0), no_uv), green)
     for name, size, height, turn, x, z in (("Tall block", 0.6, 1.2, 18, -0.36, -0.32), ("Short block", 0.6, 0.6, -17, 0.36, 0.36)):
         put(f, name, turned_box(size, turn), white, translation=[x, 0, z], scale=[1.0, height, 1.0])
-    strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 14.0}}
+    strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 18.0}}
     glow = f.material("Lamp", (0.0, 0.0, 0.0), roughness=1.0, emissive=(1.0, 0.78, 0.50), extensions=strength)
     put(f, "Lamp", shapes.plane((-0.25, 1.998, -0.25), (0.5, 0, 0), (0, 0, 0.5), no_uv), glow)
     camera(f, (0.0, 1.0, 4.55), (0.0, 1.0, 0.0), 33)

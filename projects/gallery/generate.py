@@ -11,11 +11,13 @@ import pathlib
 import sys
 
 sys.dont_write_bytecode = True  # leaves no __pycache__ in the project
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))  # projects/generator
 
 from generator import shapes, textures  # noqa: E402
-from generator.gltf import File  # noqa: E402
+from generator.gltf import File, look_at  # noqa: E402
 from generator.shapes import Shape, bend, box, curve, lathe, rounded_box  # noqa: E402
 
+MADE_BY = "projects/gallery/generate.py"
 ASSETS = pathlib.Path(__file__).resolve().parent / "assets"
 
 # The room, inside: x -4..4, z -3.4..5.0, y 0..4.3. Walls are 0.2 thick.
@@ -28,7 +30,7 @@ STEEL = (0.62, 0.61, 0.59)
 
 def room():
     """Walls, floor, roof with its skylight, mirror, painting, lights and the camera."""
-    f = File("room")
+    f = File(MADE_BY, "room")
     oak = f.material(
         "Oak parquet",
         roughness=1.0,
@@ -234,22 +236,9 @@ def short_angle(degrees):
     return round(math.radians(degrees), 5)
 
 
-def look_at(eye, target):
-    """Rotation (x, y, z, w) that turns -Z towards the target and keeps +Y up."""
-    z = shapes.unit(shapes.sub(eye, target))
-    x = shapes.unit(shapes.cross((0.0, 1.0, 0.0), z))
-    y = shapes.cross(z, x)
-    w = math.sqrt(max(0.0, 1 + x[0] + y[1] + z[2])) / 2
-    if w > 1e-3:
-        q = ((y[2] - z[1]) / (4 * w), (z[0] - x[2]) / (4 * w), (x[1] - y[0]) / (4 * w), w)
-    else:
-        raise ValueError("a camera that looks straight back needs the other branch")
-    return [round(c, 7) for c in q]
-
-
 def plinth():
     """The prefab that the project places several times: 0.42 m square, 1 m high, on a recessed foot."""
-    f = File("plinth")
+    f = File(MADE_BY, "plinth")
     lacquer = f.material("Plinth lacquer", (0.78, 0.765, 0.735), roughness=0.42)
     shadow = f.material("Plinth foot", (0.03, 0.03, 0.032), roughness=0.6)
     top = f.node("Plinth")
@@ -279,7 +268,7 @@ def glass_material(f, name, color, thickness_m, tint, distance_m):
 
 def glass_sphere():
     """A solid glass sphere on a thin brass ring; the origin is where it stands."""
-    f = File("glass_sphere")
+    f = File(MADE_BY, "glass_sphere")
     radius = 0.19
     glass = glass_material(f, "Clear glass", (1.0, 1.0, 1.0), 2 * radius, (0.86, 0.96, 0.95), 0.6)
     brass = f.material("Ring brass", BRASS, metallic=1.0, roughness=0.2)
@@ -296,7 +285,7 @@ def glass_sphere():
 
 def glass_vase():
     """A turned vase of thick green glass: one closed surface, outer and inner wall."""
-    f = File("glass_vase")
+    f = File(MADE_BY, "glass_vase")
     glass = glass_material(f, "Green glass", (1.0, 1.0, 1.0), 0.02, (0.30, 0.78, 0.60), 0.03)
     outer = curve([(0.075, 0.004), (0.10, 0.05), (0.125, 0.14), (0.105, 0.25), (0.055, 0.35), (0.05, 0.41), (0.078, 0.47)], 10)
     inner = curve([(0.068, 0.47), (0.041, 0.41), (0.045, 0.35), (0.093, 0.25), (0.112, 0.14), (0.086, 0.06), (0.05, 0.036)], 10)
@@ -308,7 +297,7 @@ def glass_vase():
 
 def ceramic_vase():
     """A painted vase with a generated pattern."""
-    f = File("ceramic_vase")
+    f = File(MADE_BY, "ceramic_vase")
     painted = f.material("Painted glaze", roughness=0.16, base="vase_color.png")
     earth = f.material("Vase inside", (0.30, 0.20, 0.13), roughness=0.8)
     outer = curve(
@@ -323,7 +312,7 @@ def ceramic_vase():
 
 def copper_knot():
     """A torus knot of brushed copper that stands on its lowest point."""
-    f = File("copper_knot")
+    f = File(MADE_BY, "copper_knot")
     copper = f.material("Brushed copper", COPPER, metallic=1.0, roughness=0.36, orm="brushed_metal.png")
     knot = shapes.torus_knot(2, 3, 0.17, 0.048, 288, 32, (12.0, 1.0))
     lift = round(-knot.lowest(), 5)
@@ -333,7 +322,7 @@ def copper_knot():
 
 def steel_spheres():
     """Three spheres of one geometry, from polished to satin."""
-    f = File("steel_spheres")
+    f = File(MADE_BY, "steel_spheres")
     top = f.node("Steel spheres")
     radius = 0.18
     ball = f.geometry(shapes.sphere(radius))
@@ -355,7 +344,7 @@ def steel_spheres():
 
 def bench():
     """A leather bench on a black steel frame, 1.5 m long."""
-    f = File("bench")
+    f = File(MADE_BY, "bench")
     leather = f.material("Tan leather", (0.36, 0.155, 0.062), roughness=0.48)
     steel = f.material("Bench steel", (0.02, 0.02, 0.022), roughness=0.38)
     top = f.node("Bench")

@@ -4,7 +4,10 @@ In: shapes, material and node dictionaries. Out: files. Knows no geometry and no
 """
 
 import json
+import math
 import struct
+
+from generator import shapes
 
 FLOAT, UNSIGNED_SHORT, UNSIGNED_INT = 5126, 5123, 5125
 
@@ -14,14 +17,27 @@ def short(value):
     return round(value, 5)
 
 
-class File:
-    """One glTF file under construction."""
+def look_at(eye, target):
+    """Rotation (x, y, z, w) that turns -Z towards the target and keeps +Y up."""
+    z = shapes.unit(shapes.sub(eye, target))
+    x = shapes.unit(shapes.cross((0.0, 1.0, 0.0), z))
+    y = shapes.cross(z, x)
+    w = math.sqrt(max(0.0, 1 + x[0] + y[1] + z[2])) / 2
+    if w > 1e-3:
+        q = ((y[2] - z[1]) / (4 * w), (z[0] - x[2]) / (4 * w), (x[1] - y[0]) / (4 * w), w)
+    else:
+        raise ValueError("a camera that looks straight back needs the other branch")
+    return [round(c, 7) for c in q]
 
-    def __init__(self, name):
+
+class File:
+    """One glTF file under construction; made_by is the script, from the root of the repository."""
+
+    def __init__(self, made_by, name):
         self.name = name
         self.binary = bytearray()
         self.json = {
-            "asset": {"version": "2.0", "generator": "Caustica projects/gallery/generate.py", "copyright": "CC0 1.0"},
+            "asset": {"version": "2.0", "generator": "Caustica " + made_by, "copyright": "CC0 1.0"},
             "scene": 0,
             "scenes": [{"name": name, "nodes": []}],
             "nodes": [],
@@ -38,35 +54,40 @@ class File:
             used.append(extension)
             used.sort()
 
-    def _accessor(self, rows, kind, component, target):
+    def _accessor(self, rows, kind, component, target=None):
         while len(self.binary) % 4:
             self.binary.append(0)
         start = len(self.binary)
         code = {FLOAT: "f", UNSIGNED_SHORT: "H", UNSIGNED_INT: "I"}[component]
         for row in rows:
             self.binary += struct.pack("<%d%s" % (len(row), code), *row)
-        view = self._append(
-            "bufferViews", {"buffer": 0, "byteOffset": start, "byteLength": len(self.binary) - start, "target": target}
-        )
+        fields = {"buffer": 0, "byteOffset": start, "byteLength": len(self.binary) - start}
+        view = self._append("bufferViews", dict(fields, target=target) if target else fields)
         accessor = {"bufferView": view, "componentType": component, "count": len(rows), "type": kind}
         return self._append("accessors", accessor)
 
-    def geometry(self, shape):
-        """Stores a shape; the result goes into mesh() as often as wanted."""
-        position = self._accessor(shape.positions, "VEC3", FLOAT, 34962)
-        # The bounds have to be those of the stored single-precision values.
-        stored = [struct.unpack("<3f", struct.pack("<3f", *p)) for p in shape.positions]
-        self.json["accessors"][position]["min"] = [min(p[i] for p in stored) for i in range(3)]
-        self.json["accessors"][position]["max"] = [max(p[i] for p in stored) for i in range(3)]
+    def _bounded(self, rows, kind, target=None):
+        """Floats with their bounds, which have to be those of the stored single-precision values."""
+        index = self._accessor(rows, kind, FLOAT, target)
+        width = len(rows[0])
+        stored = [struct.unpack("<%df" % width, struct.pack("<%df" % width, *row)) for row in rows]
+        self.json["accessors"][index]["min"] = [min(row[i] for row in stored) for i in range(width)]
+        self.json["accessors"][index]["max"] = [max(row[i] for row in stored) for i in range(width)]
+        return index
+
+    def geometry(self, shape, colors=None):
+        """Stores a shape; the result goes into mesh() as often as wanted. colors: linear RGB, one a vertex."""
+        position = self._bounded(shape.positions, "VEC3", 34962)
         component = UNSIGNED_SHORT if len(shape.positions) < 65535 else UNSIGNED_INT
-        return {
-            "attributes": {
-                "POSITION": position,
-                "NORMAL": self._accessor(shape.normals, "VEC3", FLOAT, 34962),
-                "TEXCOORD_0": self._accessor(shape.uvs, "VEC2", FLOAT, 34962),
-            },
-            "indices": self._accessor([(i,) for i in shape.indices], "SCALAR", component, 34963),
+        attributes = {
+            "POSITION": position,
+            "NORMAL": self._accessor(shape.normals, "VEC3", FLOAT, 34962),
+            "TEXCOORD_0": self._accessor(shape.uvs, "VEC2", FLOAT, 34962),
         }
+        if colors:
+            attributes["COLOR_0"] = self._accessor(colors, "VEC3", FLOAT, 34962)
+        indices = self._accessor([(i,) for i in shape.indices], "SCALAR", component, 34963)
+        return {"attributes": attributes, "indices": indices}
 
     def texture(self, image):
         """A repeating, trilinear texture of an image file beside this one."""
@@ -129,6 +150,21 @@ class File:
         else:
             self.json["nodes"][parent].setdefault("children", []).append(index)
         return index
+
+    def spin(self, name, turns, seconds):
+        """A clip in which each node of (node, whole turns) turns about its Y axis, evenly."""
+        animation = {"name": name, "samplers": [], "channels": []}
+        for node, count in turns:
+            # Four keys a turn: rotations are interpolated along the shorter way.
+            keys = 4 * abs(count)
+            times = [(seconds * i / keys,) for i in range(keys + 1)]
+            halves = [math.copysign(math.pi / 4 * i, count) for i in range(keys + 1)]
+            rotations = [(0.0, math.sin(half), 0.0, math.cos(half)) for half in halves]
+            sampler = {"input": self._bounded(times, "SCALAR"), "output": self._accessor(rotations, "VEC4", FLOAT)}
+            animation["samplers"].append(sampler)
+            target = {"node": node, "path": "rotation"}
+            animation["channels"].append({"sampler": len(animation["samplers"]) - 1, "target": target})
+        self._append("animations", animation)
 
     def write(self, folder):
         if self.binary:

@@ -212,7 +212,7 @@ impl ScenePasses {
 /// How light gets from the first surfaces to the camera.
 pub(crate) enum Radiance {
     /// Direct light, denoised while something moves, then shading with its rays.
-    Deferred(Deferred),
+    Deferred(Box<Deferred>),
     /// One path a pixel.
     Path(PathTrace),
 }
@@ -241,7 +241,7 @@ impl PassSet {
             radiance: if builder.needs.paths {
                 Radiance::Path(PathTrace::new(builder)?)
             } else {
-                Radiance::Deferred(Deferred::new(builder)?)
+                Radiance::Deferred(Box::new(Deferred::new(builder)?))
             },
             accumulate: Accumulate::new(builder)?,
             light_shadow: None,

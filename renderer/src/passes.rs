@@ -214,7 +214,7 @@ pub(crate) enum Radiance {
     /// Direct light, denoised while something moves, then shading with its rays.
     Deferred(Box<Deferred>),
     /// One path a pixel.
-    Path(PathTrace),
+    Path(Box<PathTrace>),
 }
 
 impl Radiance {
@@ -239,7 +239,7 @@ impl PassSet {
         Ok(Self {
             gbuffer: GBuffer::new(builder)?,
             radiance: if builder.needs.paths {
-                Radiance::Path(PathTrace::new(builder)?)
+                Radiance::Path(Box::new(PathTrace::new(builder)?))
             } else {
                 Radiance::Deferred(Box::new(Deferred::new(builder)?))
             },

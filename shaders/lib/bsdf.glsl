@@ -171,33 +171,21 @@ vec3 half_refracted(vec3 v, vec3 l, float eta) {
     return h.z < 0.0 ? -h : h;
 }
 
-// The microfacet normal, towards v, that sends v to l.
-vec3 bsdf_half(Bsdf bsdf, vec3 v, vec3 l) {
-    if (l.z < 0.0 && !bsdf.sides.thin) {
-        return half_refracted(v, l, bsdf.sides.eta);
-    }
-    return normalize_or(v + vec3(l.xy, abs(l.z)), vec3(0.0, 0.0, 1.0));
-}
-
-// bsdf_evaluate where the microfacet normal is known, with all its digits.
-BsdfValue bsdf_evaluate_about(Bsdf bsdf, vec3 v, vec3 l, vec3 h) {
+// Value x cosine for light from l, and the density with which bsdf_sample would have drawn it.
+BsdfValue bsdf_evaluate(Bsdf bsdf, vec3 v, vec3 l) {
     if (v.z <= 0.0 || l.z == 0.0) {
         return BSDF_NOTHING;
     }
     if (l.z > 0.0) {
-        return bsdf_reflected(bsdf, v, l, h);
+        return bsdf_reflected(bsdf, v, l, normalize_or(v + l, vec3(0.0, 0.0, 1.0)));
     }
-    BsdfValue sum = NEEDS_LOBES && bsdf.chance_beyond > 0.0 ? bsdf_beyond(bsdf, v, l) : BSDF_NOTHING;
-    if (!bsdf.sharp_transmission && max_component(bsdf.transmitted) > 0.0 && dot(v, h) > 0.0) {
-        BsdfValue through = bsdf_transmitted(bsdf, v, l, h);
-        sum = BsdfValue(sum.value + through.value, sum.pdf + through.pdf);
+    BsdfValue beyond = NEEDS_LOBES && bsdf.chance_beyond > 0.0 ? bsdf_beyond(bsdf, v, l) : BSDF_NOTHING;
+    if (bsdf.sharp_transmission || !(max_component(bsdf.transmitted) > 0.0)) {
+        return beyond;
     }
-    return sum;
-}
-
-// Value x cosine for light from l, and the density with which bsdf_sample would have drawn it.
-BsdfValue bsdf_evaluate(Bsdf bsdf, vec3 v, vec3 l) {
-    return bsdf_evaluate_about(bsdf, v, l, bsdf_half(bsdf, v, l));
+    vec3 h = bsdf.sides.thin ? normalize_or(v + vec3(l.xy, -l.z), vec3(0.0, 0.0, 1.0)) : half_refracted(v, l, bsdf.sides.eta);
+    BsdfValue through = dot(v, h) > 0.0 ? bsdf_transmitted(bsdf, v, l, h) : BSDF_NOTHING;
+    return BsdfValue(through.value + beyond.value, through.pdf + beyond.pdf);
 }
 
 // The same for a direction in render space: light that arrives from beyond the triangle passes, other light is reflected.
@@ -229,81 +217,70 @@ Scatter bsdf_sample_sharp(Bsdf bsdf, Surface surface, float v_z, bool transmitte
     return Scatter(shares.base > 0.0, true, keep_below(direction, surface.geometric_normal), weight, 0.0);
 }
 
-Scatter bsdf_sample_sharp_coat(Bsdf bsdf, Surface surface, mat3 render_from_local) {
-    vec3 direction = reflect_travel(-surface.view, render_from_local * bsdf.layers.coat.normal, surface.geometric_normal);
-    return Scatter(true, false, direction, vec3(bsdf.layers.coat_weight / bsdf.chance_coat), 0.0);
+Scatter bsdf_scatter_reflected(Bsdf bsdf, Surface surface, mat3 render_from_local, vec3 v, vec3 l) {
+    BsdfValue drawn = l.z > 0.0 ? bsdf_reflected(bsdf, v, l, normalize_or(v + l, vec3(0.0, 0.0, 1.0))) : BSDF_NOTHING;
+    return scatter_of(drawn, normalize_or(render_from_local * l, surface.geometric_normal), false, surface.geometric_normal);
 }
 
-const uint DRAWN_REFLECTED = 0u;
-const uint DRAWN_TRANSMITTED = 1u;
-const uint DRAWN_COAT = 2u;
-const uint DRAWN_BEYOND = 3u;
-const uint DRAWN_DIFFUSE = 4u;
-
-// A lobe by what it is about to send on.
-uint bsdf_draw_lobe(Bsdf bsdf, float xi) {
-    float chosen = xi - bsdf.chance_reflect;
-    if (chosen < 0.0) {
-        return DRAWN_REFLECTED;
+Scatter bsdf_sample_coat(Bsdf bsdf, Surface surface, mat3 render_from_local, vec3 v, vec2 xi) {
+    if (bsdf_sharp_coat(bsdf)) {
+        vec3 direction = reflect_travel(-surface.view, render_from_local * bsdf.layers.coat.normal, surface.geometric_normal);
+        return Scatter(true, false, direction, vec3(bsdf.layers.coat_weight / bsdf.chance_coat), 0.0);
     }
-    if (chosen < bsdf.chance_transmit) {
-        return DRAWN_TRANSMITTED;
+    vec3 l;
+    float weight;
+    if (!clearcoat_sample(bsdf.layers.coat, v, xi, l, weight)) {
+        return SCATTER_NOTHING;
+    }
+    return bsdf_scatter_reflected(bsdf, surface, render_from_local, v, l);
+}
+
+Scatter bsdf_sample_beyond(Bsdf bsdf, Surface surface, mat3 render_from_local, vec3 v, vec2 xi) {
+    vec3 mirrored = cosine_sample(xi);
+    vec3 l = vec3(mirrored.xy, -mirrored.z);
+    BsdfValue drawn = l.z < 0.0 ? bsdf_evaluate(bsdf, v, l) : BSDF_NOTHING;
+    return scatter_of(drawn, render_from_local * l, true, surface.geometric_normal);
+}
+
+Scatter bsdf_sample_interface(Bsdf bsdf, Surface surface, mat3 render_from_local, vec3 v, vec2 xi, bool transmits) {
+    vec3 h = interface_half(bsdf, v, xi);
+    float v_dot_h = clamp(dot(v, h), 0.0, 1.0);
+    vec3 l = 2.0 * v_dot_h * h - v;
+    if (!transmits) {
+        BsdfValue drawn = l.z > 0.0 ? bsdf_reflected(bsdf, v, l, h) : BSDF_NOTHING;
+        return scatter_of(drawn, normalize_or(render_from_local * l, surface.geometric_normal), false, surface.geometric_normal);
+    }
+    float cos_t = coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, v_dot_h).cos_t;
+    l = bsdf.sides.thin ? vec3(l.xy, -l.z) : refract_travel(-v, h, bsdf.sides.eta, v_dot_h, cos_t);
+    BsdfValue drawn = l.z < 0.0 ? bsdf_transmitted(bsdf, v, l, h) : BSDF_NOTHING;
+    if (NEEDS_LOBES && bsdf.chance_beyond > 0.0 && l.z < 0.0) {
+        BsdfValue beyond = bsdf_beyond(bsdf, v, l);
+        drawn = BsdfValue(drawn.value + beyond.value, drawn.pdf + beyond.pdf);
+    }
+    return scatter_of(drawn, normalize_or(render_from_local * l, -surface.geometric_normal), true, surface.geometric_normal);
+}
+
+// Draws a lobe (xi.x) by what it is about to send on, then a direction of it (xi.yz).
+Scatter bsdf_sample(Bsdf bsdf, Surface surface, mat3 render_from_local, vec3 xi) {
+    vec3 v = surface.view * render_from_local;
+    if (v.z <= 0.0) {
+        return SCATTER_NOTHING;
+    }
+    float chosen = xi.x - bsdf.chance_reflect;
+    bool reflects = chosen < 0.0;
+    if (reflects || chosen < bsdf.chance_transmit) {
+        return (reflects ? bsdf.sharp_reflection : bsdf.sharp_transmission) ? bsdf_sample_sharp(bsdf, surface, v.z, !reflects)
+            : bsdf_sample_interface(bsdf, surface, render_from_local, v, xi.yz, !reflects);
     }
     chosen -= bsdf.chance_transmit;
     if (NEEDS_LOBES && chosen < bsdf.chance_coat) {
-        return DRAWN_COAT;
+        return bsdf_sample_coat(bsdf, surface, render_from_local, v, xi.yz);
     }
     chosen -= bsdf.chance_coat;
-    return NEEDS_LOBES && chosen < bsdf.chance_beyond ? DRAWN_BEYOND : DRAWN_DIFFUSE;
-}
-
-// A direction of a lobe that is not sharp, with the microfacet normal behind it; z is 0 where there is none.
-vec3 bsdf_draw_direction(Bsdf bsdf, uint lobe, vec3 v, vec2 xi, out vec3 h) {
-    vec3 l = cosine_sample(xi);
-    if (lobe == DRAWN_BEYOND) {
-        l.z = -l.z;
-    } else if (NEEDS_LOBES && lobe == DRAWN_COAT) {
-        float weight;
-        if (!clearcoat_sample(bsdf.layers.coat, v, xi, l, weight)) {
-            l.z = 0.0;
-        }
-    } else if (lobe != DRAWN_DIFFUSE) {
-        h = interface_half(bsdf, v, xi);
-        float v_dot_h = clamp(dot(v, h), 0.0, 1.0);
-        l = 2.0 * v_dot_h * h - v;
-        if (lobe == DRAWN_TRANSMITTED) {
-            float cos_t = coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, v_dot_h).cos_t;
-            l = bsdf.sides.thin ? vec3(l.xy, -l.z) : refract_travel(-v, h, bsdf.sides.eta, v_dot_h, cos_t);
-        }
-        return l;
+    if (NEEDS_LOBES && chosen < bsdf.chance_beyond) {
+        return bsdf_sample_beyond(bsdf, surface, render_from_local, v, xi.yz);
     }
-    h = bsdf_half(bsdf, v, l);
-    return l;
-}
-
-// Draws a lobe (xi.x), then a direction of it (xi.yz).
-Scatter bsdf_sample(Bsdf bsdf, Surface surface, mat3 render_from_local, vec3 xi) {
-    vec3 v = surface.view * render_from_local;
-    uint lobe = bsdf_draw_lobe(bsdf, xi.x);
-    if (v.z <= 0.0 || (lobe == DRAWN_DIFFUSE && bsdf_chance_diffuse(bsdf) == 0.0)) {
-        return SCATTER_NOTHING;
-    }
-    bool transmitted = lobe == DRAWN_TRANSMITTED || lobe == DRAWN_BEYOND;
-    if ((lobe == DRAWN_REFLECTED && bsdf.sharp_reflection) || (lobe == DRAWN_TRANSMITTED && bsdf.sharp_transmission)) {
-        return bsdf_sample_sharp(bsdf, surface, v.z, transmitted);
-    }
-    if (NEEDS_LOBES && lobe == DRAWN_COAT && bsdf_sharp_coat(bsdf)) {
-        return bsdf_sample_sharp_coat(bsdf, surface, render_from_local);
-    }
-    vec3 h;
-    vec3 l = bsdf_draw_direction(bsdf, lobe, v, xi.yz, h);
-    float side = transmitted ? -1.0 : 1.0;
-    if (side * l.z <= 0.0) {
-        return SCATTER_NOTHING;
-    }
-    BsdfValue drawn = bsdf_evaluate_about(bsdf, v, l, h);
-    vec3 direction = normalize_or(render_from_local * l, side * surface.geometric_normal);
-    return scatter_of(drawn, direction, transmitted, surface.geometric_normal);
+    return bsdf_chance_diffuse(bsdf) > 0.0 ? bsdf_scatter_reflected(bsdf, surface, render_from_local, v, cosine_sample(xi.yz)) : SCATTER_NOTHING;
 }
 
 #endif

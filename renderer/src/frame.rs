@@ -6,7 +6,9 @@ use glam::{Mat4, Vec2};
 use crate::accel::Accel;
 use crate::delta::Invalidation;
 use crate::error::Result;
-use crate::gpu_types::{self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND};
+use crate::gpu_types::{
+    self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND,
+};
 use crate::needs::Needs;
 use crate::passes::{PassSet, Radiance, Scope};
 use crate::settings::{Pipeline, ToneMap};

@@ -6,6 +6,7 @@ mod environment;
 mod light;
 mod material;
 mod mesh;
+mod shapes;
 mod texture;
 
 pub(crate) use deform::{Bounds, join, moved};
@@ -14,4 +15,7 @@ pub use environment::{Environment, EnvironmentFile, RadianceMap};
 pub use light::{Camera, Light, LightKind, Projection};
 pub use material::{AlphaMode, Material, ShadingMode};
 pub use mesh::{Mesh, MeshData, Primitive};
+pub use shapes::{
+    Cloud, Distribution, MOST_SHAPES, Shape, ShapeFault, ShapeFile, ShapeKind, ShapeSource, Shapes,
+};
 pub use texture::{Sampler, Texture, TextureUse, Wrap};

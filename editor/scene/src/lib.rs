@@ -18,8 +18,9 @@ mod transform;
 
 pub use animation::{Animation, Channel, ChannelPath, ClipChoice, Interpolation, Sample};
 pub use assets::{
-    AlphaMode, Camera, DeformPose, Environment, EnvironmentFile, Light, LightKind, Material, Mesh, MeshData,
-    MorphTarget, Primitive, Projection, RadianceMap, Sampler, ShadingMode, SkinData, Texture, TextureUse,
+    AlphaMode, Camera, Cloud, DeformPose, Distribution, Environment, EnvironmentFile, Light, LightKind,
+    MOST_SHAPES, Material, Mesh, MeshData, MorphTarget, Primitive, Projection, RadianceMap, Sampler,
+    ShadingMode, Shape, ShapeFault, ShapeFile, ShapeKind, ShapeSource, Shapes, SkinData, Texture, TextureUse,
     Wrap,
 };
 pub use audit::{Finding, Severity, Subject, audit};

@@ -29,6 +29,7 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         section(ui, "Camera", |ui| camera_ui(cx, ui, target, camera));
     }
     if cx.session.document().mesh_of(target).is_some() {
+        super::shapes::ui(cx, ui, target);
         super::mesh::ui(cx, ui, target);
         super::material::ui(cx, ui, target);
     }
@@ -136,7 +137,8 @@ fn uniform(old: DVec3, new: DVec3) -> DVec3 {
     }
 }
 
-fn vector_field(
+/// Three numbers in a row; gives them when one was changed.
+pub(super) fn vector_field(
     ui: &mut Ui,
     name: &str,
     tip: &str,

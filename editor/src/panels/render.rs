@@ -122,14 +122,19 @@ fn sampling(ui: &mut Ui, settings: &mut ViewSettings) {
 }
 
 fn path_depth(ui: &mut Ui, settings: &mut ViewSettings) {
-    field(ui, "Path depth", "Bounces after the first surface in the path tracer; without a limit chance ends each path, and the mean is exact", |ui| {
-        let mut limited = settings.path_depth.is_some();
-        ui.checkbox(&mut limited, "at most");
-        settings.path_depth = limited.then(|| settings.path_depth.unwrap_or(settings.max_depth));
-        if let Some(depth) = &mut settings.path_depth {
-            ui.add(DragValue::new(depth).range(0..=1024).speed(0.1));
-        }
-    });
+    field(
+        ui,
+        "Path depth",
+        "Bounces after the first surface in the path tracer; without a limit chance ends each path, and the mean is exact",
+        |ui| {
+            let mut limited = settings.path_depth.is_some();
+            ui.checkbox(&mut limited, "at most");
+            settings.path_depth = limited.then(|| settings.path_depth.unwrap_or(settings.max_depth));
+            if let Some(depth) = &mut settings.path_depth {
+                ui.add(DragValue::new(depth).range(0..=1024).speed(0.1));
+            }
+        },
+    );
 }
 
 fn moving(cx: &mut Cx<'_>, ui: &mut Ui, settings: &mut ViewSettings) {

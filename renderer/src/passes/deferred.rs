@@ -44,9 +44,7 @@ impl Deferred {
             temporal.record(recorder, scope, targets, parity, filled, counters)?;
         }
         let light = match (&targets.history, moving) {
-            (Some(history), Some((filled, _))) => {
-                Some((&history.diffuse[filled], &history.specular[filled]))
-            }
+            (Some(history), Some((filled, _))) => Some((&history.diffuse[filled], &history.specular[filled])),
             _ => targets.direct_diffuse.as_ref().zip(targets.direct_specular.as_ref()),
         };
         self.shading.record(recorder, scope, targets, parity, light)

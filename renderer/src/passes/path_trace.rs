@@ -18,12 +18,7 @@ impl PathTrace {
     }
 
     /// Fills `shaded`.
-    pub(crate) fn record(
-        &self,
-        recorder: &mut Recorder,
-        scope: &Scope<'_>,
-        targets: &Targets,
-    ) -> Result<()> {
+    pub(crate) fn record(&self, recorder: &mut Recorder, scope: &Scope<'_>, targets: &Targets) -> Result<()> {
         let binds = [("gbuffer_id", Bind::Image(&targets.id)), ("shaded", Bind::Image(&targets.shaded))];
         scope.rays(recorder, "path_trace", &self.pipeline, &binds, scope.rows.clone(), 0)
     }

@@ -12,6 +12,8 @@ pub struct Placed {
     /// Unit space, where it has radius or half extents 1, to world space.
     pub world_from_unit: DAffine3,
     unit_from_world: DAffine3,
+    centre: DVec3,
+    half_extent: DVec3,
 }
 
 /// The line of a ray against one shape.
@@ -21,8 +23,13 @@ pub struct Line {
     pub met: Option<[f64; 2]>,
     /// By which share the shape had to grow or shrink for the line to touch it: 0 at the outline.
     pub margin: f64,
-    /// Distance of the origin from the centre, unit space.
+    /// Unit space.
     pub origin: DVec3,
+    /// How much a rounding of the ray grows on its way to the shape: the distance of its origin in half sizes, at least 1. A
+    /// moved shape takes the ray to primitive space first, where distances count from the origin and all axes are mixed.
+    pub reach: f64,
+    /// How far from the primitive's origin the ray and the shape are, metres; 0 for a shape that was not moved.
+    pub detour_m: f64,
 }
 
 /// What a ray meets first.
@@ -34,15 +41,37 @@ pub struct Hit {
 }
 
 impl Placed {
-    pub fn new(sphere: bool, moved: bool, world_from_unit: DAffine3) -> Self {
-        Self { sphere, moved, world_from_unit, unit_from_world: world_from_unit.inverse() }
+    pub fn new(
+        sphere: bool,
+        mesh_from_primitive: Option<DAffine3>,
+        centre: DVec3,
+        half_extent: DVec3,
+    ) -> Self {
+        let own = DAffine3 { matrix3: DMat3::from_diagonal(half_extent), translation: centre };
+        let world_from_unit = mesh_from_primitive.unwrap_or(DAffine3::IDENTITY) * own;
+        let (moved, unit_from_world) = (mesh_from_primitive.is_some(), world_from_unit.inverse());
+        Self { sphere, moved, world_from_unit, unit_from_world, centre, half_extent }
     }
 
     pub fn line(&self, origin: DVec3, direction: DVec3) -> Line {
         let o = self.unit_from_world.transform_point3(origin);
         let d = self.unit_from_world.transform_vector3(direction);
         let (met, reach) = if self.sphere { sphere(o, d) } else { cube(o, d) };
-        Line { met, margin: (reach - 1.0).abs(), origin: o }
+        Line { met, margin: (reach - 1.0).abs(), origin: o, reach: self.reach(o), detour_m: self.detour_m(o) }
+    }
+
+    fn reach(&self, origin: DVec3) -> f64 {
+        let way = if self.moved {
+            self.detour_m(origin) * self.half_extent.recip().length()
+        } else {
+            origin.length()
+        };
+        way.max(1.0)
+    }
+
+    fn detour_m(&self, origin: DVec3) -> f64 {
+        let place = origin * self.half_extent + self.centre;
+        if self.moved { place.length() + self.centre.length() } else { 0.0 }
     }
 
     /// How far outside a point of unit space lies: 0 on the surface, below 0 inside.

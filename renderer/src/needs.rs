@@ -98,8 +98,10 @@ pub struct Needs {
     pub alpha: bool,
     /// Shadow rays: false in the raster pipeline.
     pub shadow_rays: bool,
-    /// The temporal pass.
+    /// Light is denoised over time while something moves.
     pub temporal: bool,
+    /// And over space.
+    pub spatial: bool,
     /// Motion vectors.
     pub motion: bool,
     /// Spheres and boxes: false in the raster pipeline, which does not draw them.
@@ -122,7 +124,9 @@ impl Needs {
             || scene.lights > settings.light_samples
             || scene.emissive_triangles > 0
             || scene.environment
-            || scene.alpha;
+            || scene.alpha
+            || (paths && scene.lights > 0);
+        let temporal = settings.temporal && rays;
         Self {
             lights: all || scene.lights > 0,
             emissive_lights: all || scene.emissive_triangles > 0,
@@ -136,8 +140,9 @@ impl Needs {
             any_hit: rays && (all || scene.any_hit),
             alpha: all || scene.alpha,
             shadow_rays: rays,
-            temporal: settings.temporal && rays && !paths && (all || noisy),
-            motion: all || settings.show == Show::Motion || (settings.temporal && rays && !paths && noisy),
+            temporal: temporal && (all || noisy),
+            spatial: temporal && settings.spatial && (all || noisy),
+            motion: all || settings.show == Show::Motion || (temporal && noisy),
             shapes: rays && (all || scene.shapes),
             primary_rays: paths || settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
             paths,
@@ -188,7 +193,16 @@ impl Needs {
                 nothing
             }
         };
-        let list: [(bool, &str, &str); 15] = [
+        let why_not_denoised = |switched_off: &'static str| {
+            if !rays {
+                no_rays
+            } else if settings.temporal && !self.temporal {
+                "every light is hard, so one ray gives the exact shadow"
+            } else {
+                switched_off
+            }
+        };
+        let list: [(bool, &str, &str); 16] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -226,15 +240,16 @@ impl Needs {
             (
                 self.temporal,
                 "temporal denoising",
-                if !rays {
-                    no_rays
-                } else if self.paths {
-                    "paths are averaged, not filtered"
-                } else if settings.temporal {
-                    "every light is hard, so one ray gives the exact shadow"
+                why_not_denoised("a still image accumulates its samples"),
+            ),
+            (
+                self.spatial,
+                "spatial denoising",
+                why_not_denoised(if settings.temporal {
+                    "it is switched off"
                 } else {
                     "a still image accumulates its samples"
-                },
+                }),
             ),
         ];
         list.into_iter()

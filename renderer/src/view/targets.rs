@@ -10,7 +10,16 @@ use crate::needs::Needs;
 /// Images that the next frame reads as its past: two of each, taken in turns.
 pub(crate) struct History {
     pub(crate) diffuse: [Image; 2],
+    /// One texel, as the light of paths is whole.
     pub(crate) specular: [Image; 2],
+    /// One texel when no rays leave the first surfaces.
+    pub(crate) reflected: [Image; 2],
+    /// Of the reflected light, with the depth of its image; one texel as there.
+    pub(crate) image: [Image; 2],
+    /// Of direct light; one texel when nothing is filtered over space.
+    pub(crate) moments: [Image; 2],
+    /// Diffuse, specular and reflected light in turns between the steps of the filter; one texel as in the four above.
+    pub(crate) filtered: [[Image; 3]; 2],
 }
 
 /// The images of a view.
@@ -27,6 +36,9 @@ pub(crate) struct Targets {
     pub(crate) emissive: Option<Image>,
     pub(crate) direct_diffuse: Option<Image>,
     pub(crate) direct_specular: Option<Image>,
+    /// What rays bring, to be denoised; one texel when nothing is.
+    pub(crate) reflected: Image,
+    pub(crate) reflected_tint: Image,
     pub(crate) history: Option<History>,
     pub(crate) shaded: Image,
     pub(crate) display: Image,
@@ -45,24 +57,35 @@ impl Targets {
             let desc = ImageDesc { extent, format: Format::Depth32, mip_levels: 1, usage: ImageUse::Depth };
             Image::new(device, name, desc)
         };
-        let one_texel = || {
-            let (extent, format) = ([1, 1], Format::Rg32Float);
-            Image::new(
-                device,
-                "unused motion",
-                ImageDesc { extent, format, mip_levels: 1, usage: ImageUse::Target },
-            )
+        let or_one_texel = |wanted: bool, name: &str, format| {
+            let extent = if wanted { extent } else { [1, 1] };
+            Image::new(device, name, ImageDesc { extent, format, mip_levels: 1, usage: ImageUse::Target })
         };
         let pasts = if needs.temporal { 2 } else { 1 };
-        let light = needs.direct_light() && !needs.paths;
-        let history = if needs.temporal && light {
-            let pair = |name: &str| -> Result<[Image; 2]> {
-                Ok([make(name, Format::Rgba32Float)?, make(name, Format::Rgba32Float)?])
-            };
-            Some(History { diffuse: pair("history_diffuse")?, specular: pair("history_specular")? })
-        } else {
-            None
+        let light = needs.direct_light();
+        let denoises = needs.temporal && light;
+        let brought = denoises && (needs.reflection || needs.refraction);
+        let signal = |wanted: bool, name: &str| or_one_texel(wanted, name, Format::Rgba32Float);
+        let pair =
+            |wanted: bool, name: &str| -> Result<[Image; 2]> { Ok([signal(wanted, name)?, signal(wanted, name)?]) };
+        let filtered = || -> Result<[Image; 3]> {
+            let wanted = needs.spatial;
+            Ok([
+                signal(wanted, "filtered_diffuse")?,
+                signal(wanted && !needs.paths, "filtered_specular")?,
+                signal(wanted && brought, "filtered_reflected")?,
+            ])
         };
+        let history = denoises.then(|| -> Result<History> {
+            Ok(History {
+                diffuse: pair(true, "history_diffuse")?,
+                specular: pair(!needs.paths, "history_specular")?,
+                reflected: pair(brought, "history_reflected")?,
+                image: pair(brought, "history_image")?,
+                moments: pair(needs.spatial, "history_moments")?,
+                filtered: [filtered()?, filtered()?],
+            })
+        });
         let optional = |wanted: bool, name: &str, format| wanted.then(|| make(name, format)).transpose();
         Ok(Self {
             id: make("gbuffer_id", Format::Rgba32Uint)?,
@@ -72,11 +95,13 @@ impl Targets {
             depth: (0..pasts).map(|_| depth("gbuffer_depth")).collect::<std::result::Result<_, _>>()?,
             base_color: make("gbuffer_base_color", Format::Rgba16Float)?,
             material: make("gbuffer_material", Format::Rg16Float)?,
-            motion: if needs.motion { make("gbuffer_motion", Format::Rg32Float) } else { one_texel() }?,
+            motion: or_one_texel(needs.motion, "gbuffer_motion", Format::Rg32Float)?,
             emissive: optional(needs.emission, "gbuffer_emissive", Format::Rgba32Float)?,
-            direct_diffuse: optional(light, "direct_diffuse", Format::Rgba32Float)?,
-            direct_specular: optional(light, "direct_specular", Format::Rgba32Float)?,
-            history,
+            direct_diffuse: optional(light && (denoises || !needs.paths), "direct_diffuse", Format::Rgba32Float)?,
+            direct_specular: optional(light && !needs.paths, "direct_specular", Format::Rgba32Float)?,
+            reflected: signal(brought, "reflected")?,
+            reflected_tint: or_one_texel(brought || (denoises && needs.paths), "reflected_tint", Format::Rgba16Float)?,
+            history: history.transpose()?,
             shaded: make("shaded", Format::Rgba32Float)?,
             display: make("display", Format::Rgba16Float)?,
             window: optional(window, "window", Format::Rgba16Float)?,

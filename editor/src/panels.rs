@@ -14,7 +14,9 @@ pub mod bars;
 pub mod environment;
 pub mod inspector;
 pub mod material;
+mod material_lobes;
 pub mod mesh;
+pub mod number;
 pub mod outliner;
 pub mod overlays;
 pub mod render;
@@ -98,8 +100,24 @@ pub fn field(ui: &mut Ui, name: &str, tip: &str, body: impl FnOnce(&mut Ui)) {
     });
 }
 
+/// Milliseconds, or a dash as long as nothing was measured.
+pub fn milliseconds(ms: Option<f64>, decimals: usize) -> String {
+    ms.map_or_else(|| String::from("\u{2014}"), |ms| format!("{ms:.decimals$}"))
+}
+
 /// A sentence in the middle of an empty panel.
 pub fn empty_note(ui: &mut Ui, text: &str) {
     ui.add_space(12.0);
     ui.vertical_centered(|ui| ui.weak(text));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_measured_is_no_zero() {
+        assert_eq!(milliseconds(None, 2), "\u{2014}");
+        assert_eq!(milliseconds(Some(1.256), 2), "1.26");
+    }
 }

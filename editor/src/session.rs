@@ -12,6 +12,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use caustica_renderer::delta::LightId;
 use caustica_renderer::gpu::{Device, Frames};
 use caustica_renderer::{
     AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings,
@@ -25,7 +26,7 @@ pub use host_times::{HostTimes, Lap};
 pub use tally::Tally;
 
 use crate::history::History;
-use crate::sync::Sync;
+use crate::sync::{Sync, instance_id};
 
 /// Device time of one submit while the window is open: input is answered in between.
 const SUBMIT_BUDGET_MS: f64 = 30.0;
@@ -125,6 +126,12 @@ impl Session {
     /// The document.
     pub fn document(&self) -> &Document {
         &self.document
+    }
+
+    /// Names of the lights, in order, with their ids in the renderer.
+    pub fn light_names(&self) -> Vec<(LightId, String)> {
+        let named = |target| (instance_id(target), self.document.display_name(target));
+        self.document.lights().map(|light| named(light.target)).collect()
     }
 
     /// Undo and redo stacks.
@@ -346,12 +353,28 @@ impl Session {
         }
     }
 
+    /// Renders one pixel for `divisor` x `divisor` of the view, as while something moves on a slow device.
+    pub fn set_divisor(&mut self, divisor: u32) {
+        if let Ok(view) = self.renderer.view_mut(self.view) {
+            view.set_divisor(divisor);
+        }
+    }
+
     /// Starts the sample set at `offset`.
     ///
     /// # Errors
     /// Never while the session lives; kept for the renderer's error type.
     pub fn set_sample_offset(&mut self, offset: u64) -> anyhow::Result<()> {
         self.renderer.view_mut(self.view)?.set_sample_offset(offset);
+        Ok(())
+    }
+
+    /// Says how many samples are going to be taken; `None`: nobody knows.
+    ///
+    /// # Errors
+    /// When the view was removed.
+    pub fn set_sample_target(&mut self, samples: Option<u64>) -> anyhow::Result<()> {
+        self.renderer.view_mut(self.view)?.set_sample_target(samples);
         Ok(())
     }
 

@@ -4,6 +4,7 @@
 mod assets;
 mod convert;
 mod deform;
+mod material;
 mod origin;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -16,7 +16,7 @@ mod euler;
 mod rows;
 mod selection;
 
-pub use config::{Config, Tab, default_layout};
+pub use config::{Config, Tab, add_tab, default_layout};
 pub use euler::EulerFields;
 pub use rows::{OutlinerState, Row};
 pub use selection::{SelectedPrimitive, Selection};

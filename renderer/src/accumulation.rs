@@ -72,9 +72,7 @@ impl Accumulation {
         if what == Invalidation::Nothing {
             return;
         }
-        // A change of size follows a move on slow devices; with nothing accumulated since, the move is the reason.
-        let follows = what == Invalidation::Resize && self.samples == 0 && self.resets > 0;
-        if what > self.pending && !follows {
+        if what > self.pending {
             reason.clone_into(&mut self.reason);
         }
         self.pending = self.pending.max(what);
@@ -151,5 +149,19 @@ mod tests {
         counter.invalidate(Invalidation::Camera, "camera");
         assert_eq!(counter.reason(), "moved Chair");
         assert_eq!(counter.take_pending(), Invalidation::Scene);
+    }
+
+    #[test]
+    fn a_change_of_size_gives_the_reason_only_when_it_is_alone() {
+        let camera = (Invalidation::Camera, "camera");
+        let size = (Invalidation::Resize, "size of the view");
+        for (events, expected) in
+            [(vec![size, camera], camera), (vec![camera, size], camera), (vec![size], size)]
+        {
+            let mut counter = Accumulation::default();
+            counter.take_pending();
+            events.iter().for_each(|(what, reason)| counter.invalidate(*what, reason));
+            assert_eq!((counter.take_pending(), counter.reason()), expected);
+        }
     }
 }

@@ -3,13 +3,16 @@
 //! It knows no hierarchy and no file format. Lengths are metres in render space
 //! (world space less the render origin, which the caller subtracts in double precision).
 
+mod lobes;
 mod material;
 mod mesh;
 
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3};
+use serde::{Deserialize, Serialize};
 
+pub use lobes::Lobes;
 pub use material::{AlphaMode, Material, Sampler, ShadingMode, Texture, TextureUse, Wrap};
 pub use mesh::{Deformation, Geometry, Mesh, MorphTarget, Pose, Shape, ShapeKind};
 
@@ -27,7 +30,7 @@ pub struct TextureId(pub u64);
 
 /// Persistent id of an instance: the scene node that owns it and the part inside that node
 /// (a prefab instance holds many parts).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct InstanceId {
     /// The 64-bit id of the owning scene node.
     pub node: u64,
@@ -256,10 +259,10 @@ pub enum Invalidation {
     /// Exposure, tone map, overlay, selection, a swap between equal variants: samples are kept.
     #[default]
     Nothing,
+    /// Size of the view: starts again, history is dropped with the targets, whatever else happens.
+    Resize,
     /// The camera moved: this view starts again, history is reprojected by motion vectors.
     Camera,
-    /// Size of the view: starts again, history is dropped.
-    Resize,
     /// Materials, lights, environment, transforms: all views start again, history is reprojected.
     Scene,
     /// Pipeline, quality setting, shader or render origin: all starts again, history is dropped.

@@ -7,14 +7,13 @@ use crate::accel::Accel;
 use crate::delta::Invalidation;
 use crate::error::Result;
 use crate::gpu_types::{
-    self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND,
-    FRAME_STEADY,
+    self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND, FRAME_STEADY,
 };
 use crate::needs::Needs;
-use crate::passes::{Moving, PassSet, Radiance, Scope};
-use crate::settings::{Pipeline, ToneMap};
+use crate::passes::{Moving, PassSet, Radiance, Scope, Shown};
+use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
 use crate::tables::Tables;
-use crate::view::{CameraMatrices, View, jitter_px};
+use crate::view::{CameraMatrices, Targets, View};
 
 /// Records one frame of a view.
 ///
@@ -76,15 +75,18 @@ pub(crate) fn record(
     let display = view.display_key();
     let mut displayed = None;
     let has_samples = view.accumulation.samples() > 0;
-    if band.last || (has_samples && view.displayed.as_ref() != Some(&display)) {
-        passes.post.record(
-            recorder,
-            &scope,
-            targets,
-            (parity, shown_history),
-            accumulator,
-            view.settings().show,
-        )?;
+    let shown_anew = view.displayed.as_ref() != Some(&display);
+    if band.last || (has_samples && shown_anew) {
+        let fresh = shown_anew || plan.moving || constants.accumulated == 0;
+        let light_shadow = record_light_shadow(recorder, &scope, view.settings(), targets, passes, fresh)?;
+        let shown = Shown {
+            show: view.settings().show,
+            light_shadow,
+            parity,
+            history: shown_history,
+            added: band.last && !plan.moving,
+        };
+        passes.post.record(recorder, &scope, targets, accumulator, &shown)?;
         displayed = Some(display);
     }
     let counters = &view.counters;
@@ -105,6 +107,26 @@ pub(crate) fn record(
     view.previous = Some(matrices);
     view.frame_count += 1;
     Ok(())
+}
+
+/// Traces the shadow of a light when it is what is shown. False: there is none, as no such light shines or no rays
+/// are cast. `fresh`: it does not go on with that of the frames before.
+fn record_light_shadow(
+    recorder: &mut Recorder,
+    scope: &Scope<'_>,
+    settings: &ViewSettings,
+    targets: &Targets,
+    passes: &PassSet,
+    fresh: bool,
+) -> Result<bool> {
+    let (Show::Shadow, Some(pass), Some(image)) =
+        (settings.show, &passes.light_shadow, &targets.light_shadow)
+    else {
+        return Ok(false);
+    };
+    let Some(light) = scope.tables.lights.index_of(settings.show_light) else { return Ok(false) };
+    pass.record(recorder, scope, (&targets.id, image), light, fresh)?;
+    Ok(true)
 }
 
 /// What kind of frame this is.
@@ -135,11 +157,10 @@ fn frame_constants(
     let extent = view.extent();
     let sample = view.accumulation.next_sample();
     let sample_index = if plan.moving { view.accumulation.next_moving_index() } else { sample.index };
-    let jittered =
-        crate::accumulation::Sample { index: sample_index, stream: (sample_index % 2) as u32, ..sample };
     let selection = selection_address(recorder, view)?;
     let settings = view.settings();
-    let jitter = if settings.jitter { jitter_px(&jittered, settings.seed) } else { Vec2::ZERO };
+    let jitter =
+        if settings.jitter { view.sampling().jitter_px(settings.seed, sample_index) } else { Vec2::ZERO };
     let previous: Mat4 =
         view.previous.map_or(matrices.clip_from_render, |previous| previous.clip_from_render);
     let path = settings.pipeline == Pipeline::Path;
@@ -169,6 +190,7 @@ fn frame_constants(
         accumulator: view.accumulator.as_ref().map_or(0, caustica_gpu::Buffer::address),
         sample_index,
         selection,
+        ggx_albedo: if settings.multiple_scattering { tables.ggx_albedo_address() } else { 0 },
         seed: settings.seed,
         flags,
         light_samples: settings.light_samples.max(1),

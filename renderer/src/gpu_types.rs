@@ -2,11 +2,9 @@
 //! In: nothing. Out: plain-old-data types whose size and field offsets are asserted at compile time, and
 //! [`twins`], the same numbers as data, for the test against SPIR-V reflection. Knows no table and no Vulkan.
 
-mod constants;
+use std::sync::LazyLock;
 
 use bytemuck::{Pod, Zeroable};
-
-pub use constants::*;
 
 /// Three rows of a 3x4 affine map: `p' = (dot(row.xyz, p) + row.w, ...)`.
 pub type Rows = [[f32; 4]; 3];
@@ -41,16 +39,26 @@ macro_rules! twins {
             };
         )*
 
-        /// Every struct shared with GLSL, in the order of the files in `shaders/shared/`.
-        #[must_use]
-        pub fn twins() -> &'static [Twin] {
-            &[$(Twin {
-                name: stringify!($name),
-                size: $size,
-                fields: &[$((stringify!($field), $offset)),*],
-            }),*]
-        }
+        /// These structs as data.
+        pub(super) const TWINS: &[Twin] = &[$(Twin {
+            name: stringify!($name),
+            size: $size,
+            fields: &[$((stringify!($field), $offset)),*],
+        }),*];
     };
+}
+
+mod constants;
+mod material;
+
+pub use constants::*;
+pub use material::{Material, MaterialLobes, TextureUse};
+
+/// Every struct shared with GLSL.
+#[must_use]
+pub fn twins() -> &'static [Twin] {
+    static ALL: LazyLock<Vec<Twin>> = LazyLock::new(|| [TWINS, material::TWINS].concat());
+    &ALL
 }
 
 twins! {
@@ -124,62 +132,6 @@ twins! {
         48 color_ba: u32,
     }
 
-    /// A texture as a material uses it.
-    struct TextureUse, size 32 {
-        /// Index into the bindless array, or [`NO_TEXTURE`].
-        0 texture: u32,
-        /// Texture coordinate set, 0 or 1.
-        4 tex_coord: u32,
-        /// `KHR_texture_transform`: `uv' = linear * uv + offset`.
-        8 offset: [f32; 2],
-        /// 2x2 matrix by rows: m00, m01, m10, m11.
-        16 linear: [f32; 4],
-    }
-
-    /// A material: glTF metallic-roughness with its extensions and a shading mode.
-    struct Material, size 256 {
-        /// Linear RGB and alpha.
-        0 base_color: [f32; 4],
-        /// Emitted radiance.
-        16 emissive: [f32; 3],
-        /// 0..1.
-        28 metallic: f32,
-        /// `KHR_materials_specular` colour factor.
-        32 specular_color: [f32; 3],
-        /// `KHR_materials_specular` strength.
-        44 specular: f32,
-        /// Absorption coefficient of the volume, 1/m.
-        48 attenuation_per_m: [f32; 3],
-        /// Perceptual roughness; GGX alpha is its square.
-        60 roughness: f32,
-        /// Scale of the normal map's x and y.
-        64 normal_scale: f32,
-        /// Strength of the occlusion texture.
-        68 occlusion_strength: f32,
-        /// Index of refraction.
-        72 ior: f32,
-        /// `KHR_materials_transmission` factor.
-        76 transmission: f32,
-        /// `alphaCutoff` of the MASK mode.
-        80 alpha_cutoff: f32,
-        /// `MODE_*`.
-        84 mode: u32,
-        /// `MATERIAL_*` bits.
-        88 flags: u32,
-        /// Where volumes overlap, the higher one counts; equal: the one entered last.
-        92 medium_priority: u32,
-        /// sRGB colour, alpha in a.
-        96 base_color_texture: TextureUse,
-        /// Roughness in g, metallic in b, linear.
-        128 metallic_roughness_texture: TextureUse,
-        /// Tangent-space normal, linear.
-        160 normal_texture: TextureUse,
-        /// Occlusion in r, linear.
-        192 occlusion_texture: TextureUse,
-        /// sRGB colour.
-        224 emissive_texture: TextureUse,
-    }
-
     /// A punctual light with a size.
     struct Light, size 64 {
         /// Render space, metres (point, spot).
@@ -227,7 +179,7 @@ twins! {
     }
 
     /// The scene's tables by device address.
-    struct Scene, size 112 {
+    struct Scene, size 128 {
         /// [`Instance`] by slot.
         0 instances: u64,
         /// `u32[]`: material index, one per (instance, geometry).
@@ -246,26 +198,30 @@ twins! {
         56 environment_alias: u64,
         /// `u32[]`: instance slots, indexed by `gl_InstanceIndex` of the raster draws.
         64 draw_instances: u64,
+        /// [`MaterialLobes`] by index; 0: no material has any.
+        72 material_lobes: u64,
+        /// `f32[]`: share of light that sheen reflects (`tables/sheen.rs`); 0: no material has sheen.
+        80 sheen_albedo: u64,
         /// Number of punctual lights.
-        72 light_count: u32,
+        88 light_count: u32,
         /// Number of emissive triangles.
-        76 emissive_count: u32,
+        92 emissive_count: u32,
         /// Columns of the environment's grid; 0: constant environment.
-        80 environment_width: u32,
+        96 environment_width: u32,
         /// Rows of the environment's grid.
-        84 environment_height: u32,
+        100 environment_height: u32,
         /// The constant radiance, or the factor on the map.
-        88 environment_radiance: [f32; 3],
+        104 environment_radiance: [f32; 3],
         /// Turn of the map around +Y, radians.
-        100 environment_rotation_rad: f32,
+        116 environment_rotation_rad: f32,
         /// Sum of area times luminance over the emissive triangles.
-        104 emissive_power: f32,
+        120 emissive_power: f32,
         /// Padding.
-        108 pad0: u32,
+        124 pad0: u32,
     }
 
     /// One view's constants for one frame.
-    struct Frame, size 368 {
+    struct Frame, size 376 {
         /// Jittered, by columns; reverse depth: 1 at the near plane, 0 at infinity.
         0 clip_from_render: [f32; 16],
         /// The same without jitter.
@@ -294,34 +250,36 @@ twins! {
         296 sample_index: u64,
         /// Device address of a bit set by instance slot: the outlined ones; 0: nothing is selected.
         304 selection: u64,
+        /// Device address of the table of `lib/ggx_albedo.glsl`; 0: light is reflected once by rough surfaces.
+        312 ggx_albedo: u64,
         /// Seed of all random numbers.
-        312 seed: u32,
+        320 seed: u32,
         /// `FRAME_*` bits.
-        316 flags: u32,
+        324 flags: u32,
         /// Lights a pixel; all of them when there are at most this many.
-        320 light_samples: u32,
+        328 light_samples: u32,
         /// Shadow rays a light and pixel, at least 1.
-        324 shadow_rays: u32,
+        332 shadow_rays: u32,
         /// Reflections and refractions after the first surface.
-        328 max_depth: u32,
+        336 max_depth: u32,
         /// `TONE_MAP_*`.
-        332 tone_map: u32,
+        340 tone_map: u32,
         /// Surfaces up to this roughness trace their specular lobe.
-        336 reflection_roughness_max: f32,
+        344 reflection_roughness_max: f32,
         /// Upper bound on the history length while moving, frames.
-        340 temporal_max_history: f32,
+        348 temporal_max_history: f32,
         /// Which block of its stream this sample belongs to.
-        344 block_index: u32,
+        352 block_index: u32,
         /// 1 when this sample is the first of its block.
-        348 block_start: u32,
+        356 block_start: u32,
         /// 1 when this sample is the last of its block.
-        352 block_end: u32,
+        360 block_end: u32,
         /// Samples in the accumulator before this frame; 0: it is overwritten.
-        356 accumulated: u32,
+        364 accumulated: u32,
         /// Instance slots that the bit set of `selection` covers.
-        360 selection_count: u32,
+        368 selection_count: u32,
         /// Zero.
-        364 pad0: u32,
+        372 pad0: u32,
     }
 
     /// What the device counts in a frame.

@@ -19,8 +19,8 @@ const PDF_TOLERANCE: f32 = 5e-5;
 pub struct Inventory {
     /// Instances.
     pub instances: BTreeMap<InstanceId, InstanceEntry>,
-    /// Materials without their texture slots, and the textures they use, in the order of the record.
-    pub materials: BTreeMap<MaterialId, (gpu_types::Material, Vec<Option<TextureId>>)>,
+    /// Materials.
+    pub materials: BTreeMap<MaterialId, MaterialEntry>,
     /// Meshes, at rest those that deform.
     pub meshes: BTreeMap<MeshId, MeshEntry>,
     /// Textures.
@@ -37,6 +37,17 @@ pub struct Inventory {
     pub blases: BTreeSet<String>,
     /// Where everything lies. The one thing that depends on the way to the scene: [`Self::differences`] leaves it out.
     pub layout: Layout,
+}
+
+/// One material on the device.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialEntry {
+    /// Its record, texture slots and index of the lobes taken out.
+    pub record: gpu_types::Material,
+    /// Its lobes, texture slots taken out.
+    pub lobes: Option<gpu_types::MaterialLobes>,
+    /// Textures, in the order of the records.
+    pub textures: Vec<Option<TextureId>>,
 }
 
 /// One instance on the device.

@@ -12,8 +12,10 @@ mod measure;
 mod needs;
 mod passes;
 mod renderer;
+mod sampling;
 mod settings;
 pub mod shader;
+mod summary;
 mod tables;
 mod view;
 
@@ -21,12 +23,14 @@ pub use accel::AccelPolicy;
 pub use accumulation::{Accumulation, BLOCK_SAMPLES, Sample};
 pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
-pub use inventory::{EnvironmentEntry, InstanceEntry, Inventory, Layout, MeshEntry, Place};
+pub use inventory::{EnvironmentEntry, InstanceEntry, Inventory, Layout, MaterialEntry, MeshEntry, Place};
 pub use measure::{
-    AccelBench, AccelStatistics, BlasTimes, DeviceProfile, LeftOut, ProfileInForce, Statistics, TlasTimes,
-    TlasWork,
+    AccelBench, AccelStatistics, BareStructure, BlasTimes, DeviceProfile, LeftOut, ProfileInForce,
+    Statistics, TlasTimes, TlasWork,
 };
-pub use needs::{Needs, SceneSummary};
+pub use needs::{Needs, SceneSummary, SurfaceSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
-pub use settings::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+pub use sampling::Sampling;
+pub use settings::{NeedsMode, Pipeline, Sampler, Show, ToneMap, ViewSettings};
+pub use tables::sheen_albedo_table;
 pub use view::{View, ViewId};

@@ -4,6 +4,6 @@ mod accel_bench;
 mod device_profile;
 mod statistics;
 
-pub use accel_bench::{AccelBench, BlasTimes, TlasTimes};
+pub use accel_bench::{AccelBench, BareStructure, BlasTimes, TlasTimes};
 pub use device_profile::{DeviceProfile, ProfileInForce};
 pub use statistics::{AccelStatistics, LeftOut, Statistics, TlasWork};

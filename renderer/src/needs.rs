@@ -1,15 +1,17 @@
 //! What this scene needs. Enters: counts of what the scene holds, and the view's settings. Leaves: which passes run,
 //! which branches stay in the shaders, and a sentence for everything that was left out. Pure: no device.
 
+use std::collections::BTreeMap;
+
 use caustica_gpu::Specialization;
 
-use crate::delta::{Material, ShadingMode};
+use crate::delta::{Material, MaterialId, ShadingMode};
 use crate::measure::LeftOut;
 use crate::settings::{NeedsMode, Pipeline, Show, ViewSettings};
 use crate::tables::{emits, has_alpha, is_opaque, transmits};
 
 /// What a scene holds, as far as it decides what is needed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SceneSummary {
     /// Punctual lights that shine.
     pub lights: u32,
@@ -21,6 +23,30 @@ pub struct SceneSummary {
     pub environment: bool,
     /// The environment is a map.
     pub environment_map: bool,
+    /// What the materials in use bring.
+    pub surfaces: SurfaceSummary,
+    /// Some mesh holds spheres or boxes.
+    pub shapes: bool,
+}
+
+impl Default for SceneSummary {
+    /// That of an empty scene.
+    fn default() -> Self {
+        Self {
+            lights: 0,
+            all_lights_hard: true,
+            emissive_triangles: 0,
+            environment: false,
+            environment_map: false,
+            surfaces: SurfaceSummary::default(),
+            shapes: false,
+        }
+    }
+}
+
+/// What one or several materials bring, as far as it decides what is needed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SurfaceSummary {
     /// Some material has a texture.
     pub textures: bool,
     /// Some material has a normal map.
@@ -29,7 +55,7 @@ pub struct SceneSummary {
     pub emission: bool,
     /// Some material mirrors.
     pub mirrors: bool,
-    /// The smallest roughness of a PBR material, in thousandths; textured roughness counts as 0.
+    /// The smallest roughness of a PBR material, in thousandths; textured roughness and glossiness count as 0.
     pub min_roughness_permille: u32,
     /// Some surface lets light pass.
     pub transmission: bool,
@@ -37,38 +63,95 @@ pub struct SceneSummary {
     pub alpha: bool,
     /// Some geometry is not opaque to rays.
     pub any_hit: bool,
-    /// Some mesh holds spheres or boxes.
-    pub shapes: bool,
+    /// Some material has lobes beside metallic-roughness, or textures of specular or transmission.
+    pub lobes: bool,
 }
 
-impl SceneSummary {
-    /// Adds what a material in use brings.
-    pub(crate) fn add_material(&mut self, material: &Material) {
-        let textures = [
-            &material.base_color_texture,
-            &material.metallic_roughness_texture,
-            &material.normal_texture,
-            &material.occlusion_texture,
-            &material.emissive_texture,
-        ];
-        self.textures |= textures.iter().any(|texture| texture.is_some());
-        self.normal_maps |= material.normal_texture.is_some();
-        self.emission |= emits(material) || material.mode == ShadingMode::Unlit;
-        self.mirrors |= material.mode == ShadingMode::Reflective;
-        self.transmission |= transmits(material);
-        self.alpha |= has_alpha(material);
-        self.any_hit |= !is_opaque(material);
-        if material.mode == ShadingMode::Pbr {
-            let textured = material.metallic_roughness_texture.is_some();
-            let roughness = if textured { 0.0 } else { material.roughness.clamp(0.0, 1.0) };
-            self.min_roughness_permille = self.min_roughness_permille.min((roughness * 1000.0) as u32);
+impl Default for SurfaceSummary {
+    /// That of no material.
+    fn default() -> Self {
+        Self {
+            textures: false,
+            normal_maps: false,
+            emission: false,
+            mirrors: false,
+            min_roughness_permille: 1001,
+            transmission: false,
+            alpha: false,
+            any_hit: false,
+            lobes: false,
+        }
+    }
+}
+
+impl SurfaceSummary {
+    fn of(material: &Material) -> Self {
+        let glossy = material.lobes.as_ref().is_some_and(|lobes| lobes.glossiness.is_some());
+        let textured = material.metallic_roughness_texture.is_some() || glossy;
+        let roughness = if textured { 0.0 } else { material.roughness.clamp(0.0, 1.0) };
+        let is_pbr = material.mode == ShadingMode::Pbr;
+        Self {
+            textures: material.textures().next().is_some(),
+            normal_maps: material.normal_texture.is_some(),
+            emission: emits(material) || material.mode == ShadingMode::Unlit,
+            mirrors: material.mode == ShadingMode::Reflective,
+            min_roughness_permille: if is_pbr { (roughness * 1000.0) as u32 } else { 1001 },
+            transmission: transmits(material) || scatters_into_volume(material),
+            alpha: has_alpha(material),
+            any_hit: !is_opaque(material),
+            lobes: material.lobes.as_ref().is_some_and(|lobes| !lobes.is_plain()),
         }
     }
 
-    /// A summary to which materials are added.
-    pub(crate) fn without_materials() -> Self {
-        Self { min_roughness_permille: 1001, all_lights_hard: true, ..Self::default() }
+    fn join(self, other: Self) -> Self {
+        Self {
+            textures: self.textures || other.textures,
+            normal_maps: self.normal_maps || other.normal_maps,
+            emission: self.emission || other.emission,
+            mirrors: self.mirrors || other.mirrors,
+            min_roughness_permille: self.min_roughness_permille.min(other.min_roughness_permille),
+            transmission: self.transmission || other.transmission,
+            alpha: self.alpha || other.alpha,
+            any_hit: self.any_hit || other.any_hit,
+            lobes: self.lobes || other.lobes,
+        }
     }
+}
+
+/// The materials in use by what they bring, so that a change of one costs the kinds there are, not the materials.
+#[derive(Debug, Default)]
+pub(crate) struct SurfaceTally {
+    known: BTreeMap<MaterialId, SurfaceSummary>,
+    counts: BTreeMap<SurfaceSummary, u32>,
+}
+
+impl SurfaceTally {
+    /// A material in use is this now; `None`: nothing has it any more.
+    pub(crate) fn set(&mut self, id: MaterialId, material: Option<&Material>) {
+        let now = material.map(SurfaceSummary::of);
+        let before = match now {
+            Some(now) => self.known.insert(id, now),
+            None => self.known.remove(&id),
+        };
+        if let Some(count) = before.and_then(|before| self.counts.get_mut(&before)) {
+            *count -= 1;
+        }
+        if let Some(now) = now {
+            *self.counts.entry(now).or_insert(0) += 1;
+        }
+        self.counts.retain(|_, count| *count > 0);
+    }
+
+    /// What they bring together.
+    pub(crate) fn summary(&self) -> SurfaceSummary {
+        self.counts.keys().fold(SurfaceSummary::default(), |all, kind| all.join(*kind))
+    }
+}
+
+/// Whether light enters a volume scattered (KHR_materials_diffuse_transmission).
+fn scatters_into_volume(material: &Material) -> bool {
+    let scatters = material.lobes.as_ref().is_some_and(|lobes| lobes.diffuse_transmission > 0.0);
+    scatters && material.has_volume && material.mode == ShadingMode::Pbr
 }
 
 /// What is built and run for one view.
@@ -104,17 +187,23 @@ pub struct Needs {
     pub spatial: bool,
     /// Motion vectors.
     pub motion: bool,
-    /// Spheres and boxes: false in the raster pipeline, which does not draw them.
+    /// Spheres and boxes.
     pub shapes: bool,
     /// Rays find the primary surfaces, not the rasteriser.
     pub primary_rays: bool,
+    /// Lobes of materials beside metallic-roughness, and textures of specular and transmission.
+    pub lobes: bool,
     /// Paths carry the light, not the passes for shadow and shading.
     pub paths: bool,
+    /// The number of rays behind a surface is shown. What is shown is no need of the scene: false with `NeedsMode::All`
+    /// too, unless it is.
+    pub ray_depth: bool,
 }
 
 impl Needs {
     /// Decides for a scene and the settings of a view.
     pub fn of(scene: &SceneSummary, settings: &ViewSettings) -> Self {
+        let surfaces = &scene.surfaces;
         let rays = settings.pipeline != Pipeline::Raster;
         let all = settings.needs == NeedsMode::All;
         let roughness_max = (settings.reflection_roughness_max * 1000.0) as u32;
@@ -124,7 +213,7 @@ impl Needs {
             || scene.lights > settings.light_samples
             || scene.emissive_triangles > 0
             || scene.environment
-            || scene.alpha
+            || surfaces.alpha
             || (paths && scene.lights > 0);
         let temporal = settings.temporal && rays;
         Self {
@@ -132,20 +221,23 @@ impl Needs {
             emissive_lights: all || scene.emissive_triangles > 0,
             environment: all || scene.environment,
             environment_map: all || scene.environment_map,
-            textures: all || scene.textures,
-            normal_maps: all || scene.normal_maps,
-            reflection: secondary && (all || scene.mirrors || scene.min_roughness_permille <= roughness_max),
-            refraction: secondary && (all || scene.transmission),
-            emission: all || scene.emission,
-            any_hit: rays && (all || scene.any_hit),
-            alpha: all || scene.alpha,
+            textures: all || surfaces.textures,
+            normal_maps: all || surfaces.normal_maps,
+            reflection: secondary
+                && (all || surfaces.mirrors || surfaces.min_roughness_permille <= roughness_max),
+            refraction: secondary && (all || surfaces.transmission),
+            emission: all || surfaces.emission,
+            any_hit: rays && (all || surfaces.any_hit),
+            alpha: all || surfaces.alpha,
             shadow_rays: rays,
             temporal: temporal && (all || noisy),
             spatial: temporal && settings.spatial && (all || noisy),
             motion: all || settings.show == Show::Motion || (temporal && noisy),
-            shapes: rays && (all || scene.shapes),
+            shapes: all || scene.shapes,
             primary_rays: paths || settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
             paths,
+            lobes: all || surfaces.lobes,
+            ray_depth: settings.show == Show::RayDepth,
         }
     }
 
@@ -174,6 +266,8 @@ impl Needs {
             self.shadow_rays,
             self.motion,
             self.shapes,
+            self.lobes,
+            self.ray_depth,
         ];
         Specialization {
             values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),
@@ -202,7 +296,7 @@ impl Needs {
                 switched_off
             }
         };
-        let list: [(bool, &str, &str); 16] = [
+        let list: [(bool, &str, &str); 17] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -214,6 +308,7 @@ impl Needs {
             (self.environment_map || !self.environment, "environment map", "the environment is a constant"),
             (self.textures, "texture look-ups", "no material has a texture"),
             (self.normal_maps, "normal mapping", "no material has a normal map"),
+            (self.lobes, "coats, sheen, films and other lobes", "every material is plain metallic-roughness"),
             (
                 rays && (self.reflection || self.paths),
                 "reflection rays",
@@ -223,25 +318,13 @@ impl Needs {
             (self.emission, "emissive target", "no surface emits"),
             (self.motion, "motion vectors", "nothing is denoised over time"),
             (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),
-            (
-                self.shapes,
-                "spheres and boxes",
-                if rays {
-                    "every mesh is made of triangles"
-                } else {
-                    "rays alone meet them, and the raster pipeline casts none"
-                },
-            ),
+            (self.shapes, "spheres and boxes", "every mesh is made of triangles"),
             (
                 settings.pipeline != Pipeline::Hybrid || !self.primary_rays,
                 "raster of primary surfaces",
-                "the scene holds spheres or boxes, which rays alone meet",
+                "the scene holds spheres or boxes, which rays meet without drawing each",
             ),
-            (
-                self.temporal,
-                "temporal denoising",
-                why_not_denoised("a still image accumulates its samples"),
-            ),
+            (self.temporal, "temporal denoising", why_not_denoised("a still image accumulates its samples")),
             (
                 self.spatial,
                 "spatial denoising",
@@ -264,9 +347,9 @@ mod tests {
     use super::*;
 
     fn summary(materials: &[Material]) -> SceneSummary {
-        let mut summary = SceneSummary::without_materials();
-        materials.iter().for_each(|material| summary.add_material(material));
-        summary
+        let mut tally = SurfaceTally::default();
+        (0..).zip(materials).for_each(|(id, material)| tally.set(MaterialId(id), Some(material)));
+        SceneSummary { surfaces: tally.summary(), ..SceneSummary::default() }
     }
 
     fn rough() -> Material {
@@ -312,8 +395,28 @@ mod tests {
     }
 
     #[test]
+    fn materials_that_come_change_and_go_leave_what_the_others_bring() {
+        let mirror = Material { mode: ShadingMode::Reflective, ..rough() };
+        let glass = Material { mode: ShadingMode::Refractive, ..rough() };
+        let smooth = Material { roughness: 0.2, ..rough() };
+        let mut tally = SurfaceTally::default();
+        let ids = [0, 1, 2, 3].map(MaterialId);
+        for (id, material) in ids.iter().zip([&mirror, &glass, &smooth, &smooth]) {
+            tally.set(*id, Some(material));
+        }
+        assert_eq!(tally.summary(), summary(&[mirror.clone(), glass.clone(), smooth.clone()]).surfaces);
+        tally.set(ids[0], Some(&rough()));
+        tally.set(ids[2], None);
+        tally.set(ids[2], None);
+        assert_eq!(tally.summary(), summary(&[rough(), glass, smooth]).surfaces);
+        ids.iter().for_each(|id| tally.set(*id, None));
+        assert_eq!(tally.summary(), SurfaceSummary::default());
+    }
+
+    #[test]
     fn all_means_all() {
-        let settings = ViewSettings { needs: NeedsMode::All, ..ViewSettings::default() };
+        let settings =
+            ViewSettings { needs: NeedsMode::All, show: Show::RayDepth, ..ViewSettings::default() };
         let needs = Needs::of(&summary(&[rough()]), &settings);
         assert!(needs.left_out(&settings).is_empty());
         assert!(needs.specialization().values.iter().all(|(_, value)| *value == 1));

@@ -8,6 +8,7 @@ mod deform;
 mod denoise;
 mod gbuffer;
 mod instance_descriptors;
+mod light_shadow;
 mod path_trace;
 mod post;
 mod shading;
@@ -30,8 +31,9 @@ pub(crate) use deform::Deform;
 pub(crate) use denoise::{Denoise, Moving};
 pub(crate) use gbuffer::GBuffer;
 pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
+pub(crate) use light_shadow::LightShadow;
 pub(crate) use path_trace::PathTrace;
-pub(crate) use post::Post;
+pub(crate) use post::{Post, Shown};
 pub(crate) use shading::Shading;
 pub(crate) use shadow::Shadow;
 pub(crate) use shape_boxes::ShapeBoxes;
@@ -41,6 +43,7 @@ use crate::accel::Accel;
 use crate::error::Result;
 use crate::gpu_types::Push;
 use crate::needs::Needs;
+use crate::settings::Show;
 use crate::shader::{Compiled, ShaderLibrary, merge_interfaces};
 use crate::tables::Tables;
 
@@ -231,6 +234,8 @@ pub(crate) struct PassSet {
     pub(crate) gbuffer: GBuffer,
     pub(crate) radiance: Radiance,
     pub(crate) accumulate: Accumulate,
+    /// Made when it is shown for the first time.
+    pub(crate) light_shadow: Option<LightShadow>,
     pub(crate) post: Post,
 }
 
@@ -244,7 +249,16 @@ impl PassSet {
                 Radiance::Deferred(Deferred::new(builder)?)
             },
             accumulate: Accumulate::new(builder)?,
+            light_shadow: None,
             post: Post::new(builder)?,
         })
+    }
+
+    /// Makes what a view asks for and was not asked for before.
+    pub(crate) fn prepare(&mut self, builder: &mut Builder<'_>, show: Show, window: bool) -> Result<()> {
+        if show == Show::Shadow && builder.needs.shadow_rays && self.light_shadow.is_none() {
+            self.light_shadow = Some(LightShadow::new(builder)?);
+        }
+        self.post.prepare(builder, show, window)
     }
 }

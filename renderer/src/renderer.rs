@@ -9,16 +9,18 @@ use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse
 use glam::{Affine3A, Vec3};
 
 use crate::accel::{Accel, AccelPolicy};
-use crate::delta::{InstanceId, Invalidation, MaterialId, SceneDelta};
+use crate::delta::{InstanceId, Invalidation, SceneDelta};
 use crate::error::{RendererError, Result};
 use crate::frame;
 use crate::gpu_types::AccumulatorPixel;
 use crate::inventory::{self, Inventory};
 use crate::measure::Statistics;
-use crate::needs::{Needs, SceneSummary};
+use crate::needs::Needs;
 use crate::passes::{Builder, PassSet, ScenePasses};
+use crate::sampling::Sampling;
 use crate::settings::{Pipeline, ViewSettings};
 use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
+use crate::summary::Summary;
 use crate::tables::{Changed, Tables};
 use crate::view::{CameraMatrices, View, ViewId};
 
@@ -62,8 +64,8 @@ pub struct Renderer {
     scene_passes: ScenePasses,
     views: BTreeMap<ViewId, View>,
     next_view: u32,
-    passes: HashMap<(Pipeline, Needs), PassSet>,
-    summary: SceneSummary,
+    passes: HashMap<(Pipeline, Needs, Sampling), PassSet>,
+    summary: Summary,
     changed: Changed,
     picked: Buffer,
 }
@@ -89,7 +91,7 @@ impl Renderer {
             views: BTreeMap::new(),
             next_view: 0,
             passes: HashMap::new(),
-            summary: SceneSummary::without_materials(),
+            summary: Summary::default(),
             changed: Changed { all: true, ..Changed::default() },
             picked: Buffer::new(device, "pick", 32, BufferUse::General, Location::ReadBack, kind)?,
         })
@@ -106,15 +108,15 @@ impl Renderer {
             let shows = changes_image(delta, &self.tables);
             let applied = self.tables.apply(recorder, delta, &mut self.changed);
             applied.inspect_err(|_| self.changed.all = true)?;
-            if changes_needs(delta) || self.summary.emissive_triangles != self.tables.emissive.len() {
-                self.summary = summarize(&self.tables);
-            }
             let what =
                 if delta.render_origin_changed { Invalidation::Everything } else { Invalidation::Scene };
             let reason = if delta.reason.is_empty() { "scene" } else { &delta.reason };
             if shows {
                 self.invalidate(what, reason);
             }
+        }
+        if self.changed.all || !delta.is_empty() {
+            self.summary.follow(delta, &mut self.tables, self.changed.all);
         }
         let slot = recorder.slot();
         let mut changed = std::mem::take(&mut self.changed);
@@ -210,11 +212,13 @@ impl Renderer {
     pub fn render(&mut self, recorder: &mut Recorder, id: ViewId) -> Result<()> {
         let view = self.view(id)?;
         let settings = view.settings().clone();
-        let needs = Needs::of(&self.summary, &settings);
-        self.prepare_passes(needs, id, recorder.slot())?;
-        let (Some(view), Some(passes)) =
-            (self.views.get_mut(&id), self.passes.get(&(settings.pipeline, needs)))
-        else {
+        let needs = Needs::of(self.summary.scene(), &settings);
+        let key = (settings.pipeline, needs, view.sampling());
+        self.prepare_passes(key, id, recorder.slot())?;
+        if settings.multiple_scattering {
+            self.tables.provide_ggx_albedo(recorder)?;
+        }
+        let (Some(view), Some(passes)) = (self.views.get_mut(&id), self.passes.get(&key)) else {
             return Ok(());
         };
         frame::read_counters(view, recorder.slot());
@@ -250,21 +254,29 @@ impl Renderer {
         Ok(self.view(id)?.statistics())
     }
 
-    fn prepare_passes(&mut self, needs: Needs, id: ViewId, frame_slot: usize) -> Result<()> {
+    fn prepare_passes(
+        &mut self,
+        key: (Pipeline, Needs, Sampling),
+        id: ViewId,
+        frame_slot: usize,
+    ) -> Result<()> {
         let view = self.view(id)?;
-        let (pipeline, show, window) = (view.settings().pipeline, view.settings().show, view.is_for_window());
+        let (show, window) = (view.settings().show, view.is_for_window());
+        let (_, needs, sampling) = key;
+        let mut specialization = needs.specialization();
+        specialization.values.extend(sampling.specialization().values);
         let mut builder = Builder {
             device: &self.device,
             library: &mut self.library,
             set: self.tables.textures.set_of(frame_slot),
             needs,
-            specialization: needs.specialization(),
+            specialization,
         };
-        let passes = match self.passes.entry((pipeline, needs)) {
+        let passes = match self.passes.entry(key) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => entry.insert(PassSet::new(&mut builder)?),
         };
-        passes.post.prepare(&mut builder, show, window)
+        passes.prepare(&mut builder, show, window)
     }
 
     /// Reads the accumulated image of a view. Waits for the device.
@@ -374,40 +386,6 @@ fn changes_image(delta: &SceneDelta, tables: &Tables) -> bool {
             .visibility
             .iter()
             .any(|(id, v)| entry(id).is_none_or(|entry| entry.instance.visibility != *v))
-}
-
-/// Whether a delta can change what is needed: transforms and poses cannot, but for emitters that lose or get a size.
-fn changes_needs(delta: &SceneDelta) -> bool {
-    !(delta.meshes.is_empty()
-        && delta.materials.is_empty()
-        && delta.instances.is_empty()
-        && delta.removed_instances.is_empty()
-        && delta.visibility.is_empty()
-        && delta.lights.is_empty()
-        && delta.removed_lights.is_empty()
-        && delta.environment.is_none())
-}
-
-/// Counts what the scene holds.
-fn summarize(tables: &Tables) -> SceneSummary {
-    let mut summary = SceneSummary {
-        lights: tables.lights.len(),
-        all_lights_hard: tables.lights.all_hard(),
-        emissive_triangles: tables.emissive.len(),
-        environment: tables.environment.shines(),
-        environment_map: tables.environment.is_map() && tables.environment.shines(),
-        shapes: tables.meshes.hold_shapes(),
-        ..SceneSummary::without_materials()
-    };
-    let mut used: Vec<MaterialId> = tables.instances.materials_in_use().collect();
-    used.sort_unstable();
-    used.dedup();
-    for id in used {
-        if let Some(material) = tables.materials.get(id) {
-            summary.add_material(material);
-        }
-    }
-    summary
 }
 
 fn read_image(device: &Arc<Device>, frames: &mut Frames, image: &Image) -> Result<Vec<u8>> {

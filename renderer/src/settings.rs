@@ -1,6 +1,12 @@
 //! What a caller may choose for a view. Plain values; the editor's panel and the command line fill the same struct.
 
+mod show;
+
 use serde::{Deserialize, Serialize};
+
+pub use show::Show;
+
+use crate::delta::LightId;
 
 /// How an image is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -62,62 +68,38 @@ impl ToneMap {
     }
 }
 
-/// What a view shows: the image, or one of the intermediate targets.
+/// Where the random numbers of a picture come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Show {
-    /// The finished image.
+#[serde(rename_all = "kebab-case")]
+pub enum Sampler {
+    /// Owen-scrambled Sobol points.
     #[default]
-    Image,
-    /// Base colour.
-    BaseColor,
-    /// Shading normal in render space.
-    Normal,
-    /// Geometric normal in render space.
-    GeometricNormal,
-    /// Depth.
-    Depth,
-    /// Metalness.
-    Metallic,
-    /// Roughness.
-    Roughness,
-    /// Motion vectors.
-    Motion,
-    /// Emitted radiance.
-    Emissive,
-    /// A colour an instance.
-    Instance,
-    /// A colour a material.
-    Material,
-    /// A colour a triangle.
-    Triangle,
-    /// Direct diffuse light, demodulated.
-    DirectDiffuse,
-    /// Direct specular light, demodulated.
-    DirectSpecular,
-    /// Length of the temporal history.
-    History,
+    Sobol,
+    /// Halton points, scrambled a pixel.
+    Halton,
+    /// Hammersley sets of as many points as samples are asked for.
+    Hammersley,
+    /// Independent numbers: hashed PCG.
+    Independent,
+    /// Sobol points with blue-noise offsets between the pixels.
+    BlueNoise,
 }
 
-impl Show {
-    /// Everything that can be shown, in the order of menus, with its name.
-    pub const ALL: [(Self, &'static str); 15] = [
-        (Self::Image, "Image"),
-        (Self::BaseColor, "Base colour"),
-        (Self::Normal, "Shading normal"),
-        (Self::GeometricNormal, "Geometric normal"),
-        (Self::Depth, "Depth"),
-        (Self::Metallic, "Metallic"),
-        (Self::Roughness, "Roughness"),
-        (Self::Motion, "Motion"),
-        (Self::Emissive, "Emission"),
-        (Self::Instance, "Instances"),
-        (Self::Material, "Materials"),
-        (Self::Triangle, "Triangles"),
-        (Self::DirectDiffuse, "Direct diffuse light"),
-        (Self::DirectSpecular, "Direct specular light"),
-        (Self::History, "History length"),
-    ];
+impl Sampler {
+    /// Every sampler, in the order of menus.
+    pub const ALL: [Self; 5] =
+        [Self::Sobol, Self::Halton, Self::Hammersley, Self::Independent, Self::BlueNoise];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sobol => "sobol",
+            Self::Halton => "halton",
+            Self::Hammersley => "hammersley",
+            Self::Independent => "independent",
+            Self::BlueNoise => "blue-noise",
+        }
+    }
 }
 
 /// Whether pipelines are made for this scene or for any.
@@ -139,12 +121,16 @@ pub struct ViewSettings {
     pub pipeline: Pipeline,
     /// What is shown.
     pub show: Show,
+    /// The light of [`Show::Shadow`]; `None`: the first that shines.
+    pub show_light: Option<LightId>,
     /// Special or general variants.
     pub needs: NeedsMode,
     /// Exposure in stops; 0 leaves radiance 1 at 1.
     pub exposure_ev: f32,
     /// Tone map.
     pub tone_map: ToneMap,
+    /// Where the random numbers come from.
+    pub sampler: Sampler,
     /// Seed of all random numbers.
     pub seed: u32,
     /// Lights a pixel in the shadow pass; all of them when there are at most this many.
@@ -155,6 +141,8 @@ pub struct ViewSettings {
     pub max_depth: u32,
     /// Bounces after the first surface in `path`; `None`: as many as paths take until chance ends them.
     pub path_depth: Option<u32>,
+    /// In `path`, rough interfaces reflect the light too that they scatter more than once; off is glTF to the letter.
+    pub multiple_scattering: bool,
     /// Surfaces up to this roughness trace their specular lobe; rougher ones see the environment only.
     pub reflection_roughness_max: f32,
     /// Shadow rays stop at glass instead of passing it tinted and unbent.
@@ -176,14 +164,17 @@ impl Default for ViewSettings {
         Self {
             pipeline: Pipeline::Hybrid,
             show: Show::Image,
+            show_light: None,
             needs: NeedsMode::Auto,
             exposure_ev: 0.0,
             tone_map: ToneMap::Neutral,
+            sampler: Sampler::Sobol,
             seed: 0,
             light_samples: 4,
             shadow_rays: 1,
             max_depth: 12,
             path_depth: None,
+            multiple_scattering: false,
             reflection_roughness_max: 0.5,
             opaque_glass_shadows: false,
             temporal: true,

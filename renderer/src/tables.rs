@@ -8,11 +8,14 @@ mod deforming;
 mod draws;
 mod emissive;
 mod environment;
+mod ggx_albedo;
 mod instances;
 mod lights;
+mod lobes;
 mod materials;
 mod meshes;
 mod shapes;
+mod sheen;
 mod snapshot;
 mod spatial_order;
 mod table;
@@ -27,6 +30,7 @@ pub(crate) use draws::Batch;
 pub(crate) use instances::{Instances, Slot};
 pub(crate) use materials::{Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits};
 pub(crate) use meshes::{MeshBuffers, Meshes, rows_of};
+pub use sheen::albedo_table as sheen_albedo_table;
 pub(crate) use snapshot::Snapshot;
 pub(crate) use spatial_order::order_of;
 pub(crate) use table::{Download, Table};
@@ -74,6 +78,8 @@ pub(crate) struct Tables {
     pub(crate) draws: Draws,
     pub(crate) deforming: Deforming,
     scene: Table<gpu_types::Scene>,
+    /// Filled when the first view asks for it.
+    ggx_albedo: Table<f32>,
     /// Stands for every table in the barrier tracker: they are read by address, which no binding shows.
     group: ResourceId,
     geometry_group: ResourceId,
@@ -92,6 +98,7 @@ impl Tables {
             draws: Draws::new(device),
             deforming: Deforming::new(device),
             scene: Table::new(device, "scene"),
+            ggx_albedo: Table::new(device, "GGX albedo"),
             group: device.new_resource_id(),
             geometry_group: device.new_resource_id(),
         })
@@ -144,6 +151,23 @@ impl Tables {
         }
         changed.deformed.extend(self.deforming.record(recorder, &passes.deform, self.geometry_group)?);
         Ok(())
+    }
+
+    /// Uploads the table of what rough interfaces reflect at once, where it is not there yet.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub(crate) fn provide_ggx_albedo(&mut self, recorder: &mut Recorder) -> Result<()> {
+        if self.ggx_albedo.len() == 0 {
+            self.ggx_albedo.replace(ggx_albedo::table());
+            recorder.declare(&[Use::Group(self.group, Stage::Transfer, Access::TransferWrite)]);
+        }
+        self.ggx_albedo.flush(recorder)
+    }
+
+    /// Device address of that table; 0: it is not there.
+    pub(crate) fn ggx_albedo_address(&self) -> u64 {
+        self.ggx_albedo.address()
     }
 
     /// Device address of the `Scene` record.
@@ -206,6 +230,8 @@ impl Tables {
             emissive_alias: self.emissive.alias_address(),
             environment_alias: self.environment.alias_address(),
             draw_instances: self.draws.address(),
+            material_lobes: self.materials.lobes_address(),
+            sheen_albedo: self.materials.sheen_albedo_address(),
             light_count: self.lights.len(),
             emissive_count: self.emissive.len(),
             environment_width,

@@ -10,15 +10,16 @@ use std::sync::Arc;
 use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse};
 
 pub(crate) use bands::Bands;
-pub(crate) use camera::{CameraMatrices, jitter_px};
+pub(crate) use camera::CameraMatrices;
 pub(crate) use targets::{History, Targets};
 
 use crate::accumulation::Accumulation;
-use crate::delta::{Camera, Invalidation};
+use crate::delta::{Camera, Invalidation, LightId};
 use crate::error::Result;
 use crate::gpu_types::AccumulatorPixel;
 use crate::measure::Statistics;
 use crate::needs::Needs;
+use crate::sampling::Sampling;
 use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
 
 /// Names a view of a renderer.
@@ -30,6 +31,12 @@ pub struct View {
     device: Arc<Device>,
     camera: Camera,
     settings: ViewSettings,
+    /// Size in pixels at full resolution.
+    full_extent: [u32; 2],
+    /// What the full resolution is divided by.
+    divisor: u32,
+    /// Samples that the caller is going to take; `None`: nobody knows.
+    sample_target: Option<u64>,
     extent: [u32; 2],
     pub(crate) accumulation: Accumulation,
     pub(crate) statistics: Statistics,
@@ -63,6 +70,7 @@ pub(crate) struct Displayed {
     exposure_ev: f32,
     tone_map: ToneMap,
     show: Show,
+    show_light: Option<LightId>,
     selection: Vec<u32>,
 }
 
@@ -89,6 +97,9 @@ impl View {
             device: Arc::clone(device),
             camera: Camera::default(),
             settings,
+            full_extent: extent.map(|n| n.max(1)),
+            divisor: 1,
+            sample_target: None,
             extent: extent.map(|n| n.max(1)),
             accumulation: Accumulation::default(),
             statistics: Statistics::default(),
@@ -107,7 +118,7 @@ impl View {
         })
     }
 
-    /// Size in pixels.
+    /// Size in pixels, as it is rendered.
     pub fn extent(&self) -> [u32; 2] {
         self.extent
     }
@@ -149,6 +160,7 @@ impl View {
             exposure_ev: self.settings.exposure_ev,
             tone_map: self.settings.tone_map,
             show: self.settings.show,
+            show_light: self.settings.show_light,
             selection: self.selection.clone(),
         }
     }
@@ -156,6 +168,21 @@ impl View {
     /// Starts the sample set at `offset`. Resets the view.
     pub fn set_sample_offset(&mut self, offset: u64) {
         self.accumulation.set_offset(offset);
+    }
+
+    /// Says how many samples are going to be taken, as far as known: Hammersley sets are made for a number. Resets the
+    /// view when its samples depend on it.
+    pub fn set_sample_target(&mut self, samples: Option<u64>) {
+        let before = self.sampling();
+        self.sample_target = samples;
+        if self.sampling() != before {
+            self.accumulation.invalidate(Invalidation::Everything, "number of samples");
+        }
+    }
+
+    /// How random numbers are drawn.
+    pub(crate) fn sampling(&self) -> Sampling {
+        Sampling::of(self.settings.sampler, self.sample_target)
     }
 
     /// Moves the camera. Resets the view when it differs from the last one.
@@ -169,19 +196,42 @@ impl View {
     /// Changes settings. Exposure, tone map, what is shown and the choice of variants keep the samples.
     pub fn set_settings(&mut self, settings: ViewSettings) {
         let what = invalidation_of(&self.settings, &settings);
-        let reason = if settings.pipeline == self.settings.pipeline { "render settings" } else { "pipeline" };
+        let reason = match &self.settings {
+            old if old.pipeline != settings.pipeline => "pipeline",
+            old if old.sampler != settings.sampler => "sampler",
+            _ => "render settings",
+        };
         self.settings = settings;
         self.accumulation.invalidate(what, reason);
     }
 
-    /// Changes the size. Resets the view when it differs from the last one.
-    pub fn resize(&mut self, extent: [u32; 2]) {
-        let extent = extent.map(|n| n.max(1));
+    /// Changes the size at full resolution. Resets the view when it differs from the last one.
+    pub fn resize(&mut self, full_extent: [u32; 2]) {
+        let full_extent = full_extent.map(|n| n.max(1));
+        if full_extent != self.full_extent {
+            self.full_extent = full_extent;
+            self.follow_extent("size of the view");
+        }
+    }
+
+    /// Changes what the full resolution is divided by, at least 1. Resets the view when it differs from the last one. The
+    /// resolution follows what moves, so that whatever was the last reason stays it.
+    pub fn set_divisor(&mut self, divisor: u32) {
+        let divisor = divisor.max(1);
+        if divisor != self.divisor {
+            self.divisor = divisor;
+            let reason = self.accumulation.reason().to_owned();
+            self.follow_extent(&reason);
+        }
+    }
+
+    fn follow_extent(&mut self, reason: &str) {
+        let extent = self.full_extent.map(|side| side.div_ceil(self.divisor));
         if extent != self.extent {
             self.extent = extent;
             self.drop_targets();
             self.accumulator = None;
-            self.accumulation.invalidate(Invalidation::Resize, "size of the view");
+            self.accumulation.invalidate(Invalidation::Resize, reason);
         }
     }
 
@@ -223,6 +273,9 @@ impl View {
             let targets = Targets::new(&self.device, self.extent, &needs, self.window)?;
             self.targets = Some((wanted, targets));
         }
+        if let Some((_, targets)) = &mut self.targets {
+            targets.prepare_shown(&self.device, self.extent, self.settings.show)?;
+        }
         if self.accumulator.is_none() {
             let pixels = u64::from(self.extent[0]) * u64::from(self.extent[1]);
             self.accumulator = Some(Buffer::new(
@@ -245,6 +298,7 @@ fn invalidation_of(old: &ViewSettings, new: &ViewSettings) -> Invalidation {
         exposure_ev: new.exposure_ev,
         tone_map: new.tone_map,
         show: new.show,
+        show_light: new.show_light,
         needs: new.needs,
         ..old.clone()
     };
@@ -254,7 +308,7 @@ fn invalidation_of(old: &ViewSettings, new: &ViewSettings) -> Invalidation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::NeedsMode;
+    use crate::settings::{NeedsMode, Sampler};
 
     #[test]
     fn what_only_changes_the_display_keeps_the_samples() {
@@ -263,6 +317,7 @@ mod tests {
             exposure_ev: 2.0,
             tone_map: ToneMap::Aces,
             show: Show::Normal,
+            show_light: Some(LightId { node: 3, part: 0 }),
             needs: NeedsMode::All,
             ..old.clone()
         };
@@ -271,6 +326,7 @@ mod tests {
             ViewSettings { pipeline: Pipeline::Raster, ..old.clone() },
             ViewSettings { max_depth: 1, ..old.clone() },
             ViewSettings { seed: 9, ..old.clone() },
+            ViewSettings { sampler: Sampler::Halton, ..old.clone() },
             ViewSettings { shadow_rays: 2, ..old.clone() },
         ] {
             assert_eq!(invalidation_of(&old, &changed), Invalidation::Everything);

@@ -1,11 +1,24 @@
-// The material model of glTF 2.0, appendix B, with KHR_materials_specular and KHR_materials_ior: a diffuse base under a GGX coat.
+// The material model of glTF 2.0, appendix B, with KHR_materials_specular, KHR_materials_ior and KHR_materials_iridescence: a diffuse base
+// under a GGX coat, which a thin film may colour.
 // Frame: local, z is the shading normal. In: a Brdf and unit directions. Out: brdf x cosine (no epsilon in it) and densities per solid angle.
 // The diffuse part is given without base colour x (1 - metallic) x (1 - transmission): the caller multiplies, so filters see light only.
 #ifndef LIB_BRDF
 #define LIB_BRDF
 
+#include "shared/needs.glsl"
 #include "lib/fresnel.glsl"
 #include "lib/ggx.glsl"
+#include "lib/thin_film.glsl"
+
+// A film over the base (KHR_materials_iridescence).
+struct Film {
+    float strength;         // 0: none
+    float ior;
+    float thickness_nm;
+    vec3 dielectric_f0;     // of the base in air, with its strength
+    vec3 metal_f0;
+    float metallic;
+};
 
 struct Brdf {
     vec3 f0;
@@ -13,6 +26,7 @@ struct Brdf {
     float dielectric_f0;    // largest channel; what the coat takes from the diffuse base
     float dielectric_f90;
     float alpha;
+    Film film;
 };
 
 struct BrdfValue {
@@ -28,11 +42,37 @@ Brdf brdf_from_material(vec3 base_color, float metallic, float roughness, float 
     brdf.dielectric_f0 = max_component(dielectric);
     brdf.dielectric_f90 = specular;
     brdf.alpha = roughness * roughness;
+    brdf.film = Film(0.0, 1.0, 0.0, dielectric, clamp(base_color, 0.0, 1.0), metallic);
     return brdf;
 }
 
-// What the coat lets through to the base: 1 - max(F) (glTF 2.0 appendix B.3.4; KHR_materials_specular).
+bool has_film(Brdf brdf) {
+    return NEEDS_LOBES && brdf.film.strength > 0.0;
+}
+
+// Reflectance of the dielectric part with its film.
+vec3 film_dielectric(Brdf brdf, float v_dot_h) {
+    Film film = brdf.film;
+    vec3 bare = fresnel_schlick(film.dielectric_f0, vec3(brdf.dielectric_f90), v_dot_h);
+    return mix(bare, fresnel_thin_film(1.0, film.ior, film.dielectric_f0, film.thickness_nm, v_dot_h), film.strength);
+}
+
+// Share of the light that a microfacet reflects.
+vec3 brdf_reflectance(Brdf brdf, float v_dot_h) {
+    if (!has_film(brdf)) {
+        return fresnel_schlick(brdf.f0, brdf.f90, v_dot_h);
+    }
+    Film film = brdf.film;
+    vec3 metal = mix(fresnel_schlick(film.metal_f0, vec3(1.0), v_dot_h),
+        fresnel_thin_film(1.0, film.ior, film.metal_f0, film.thickness_nm, v_dot_h), film.strength);
+    return mix(film_dielectric(brdf, v_dot_h), metal, film.metallic);
+}
+
+// What the coat lets through to the base: 1 - max(F) (glTF 2.0 appendix B.3.4; KHR_materials_specular, KHR_materials_iridescence).
 float brdf_base_share(Brdf brdf, float v_dot_h) {
+    if (has_film(brdf)) {
+        return 1.0 - max_component(film_dielectric(brdf, v_dot_h));
+    }
     return 1.0 - fresnel_schlick(vec3(brdf.dielectric_f0), vec3(brdf.dielectric_f90), v_dot_h).x;
 }
 
@@ -45,7 +85,7 @@ BrdfValue brdf_evaluate(Brdf brdf, vec3 v, vec3 l) {
     float v_dot_h = max(dot(v, h), 0.0);
     value.diffuse = brdf_base_share(brdf, v_dot_h) * l.z / PI;
     if (!ggx_is_delta(brdf.alpha)) {
-        value.specular = fresnel_schlick(brdf.f0, brdf.f90, v_dot_h)
+        value.specular = brdf_reflectance(brdf, v_dot_h)
             * (ggx_distribution(h, brdf.alpha) * ggx_visibility_cosine(v.z, l.z, brdf.alpha));
     }
     return value;
@@ -60,7 +100,7 @@ bool brdf_sample_specular(Brdf brdf, vec3 v, vec2 xi, out vec3 l, out vec3 weigh
         weight = vec3(0.0);
         return false;
     }
-    weight = fresnel_schlick(brdf.f0, brdf.f90, v_dot_h) * ggx_sample_weight(v.z, l.z, brdf.alpha);
+    weight = brdf_reflectance(brdf, v_dot_h) * ggx_sample_weight(v.z, l.z, brdf.alpha);
     return true;
 }
 

@@ -20,4 +20,12 @@ vec3 window_encode(vec3 linear_rgb) {
     return pow(srgb_encode(linear_rgb), vec3(2.2));
 }
 
+// A share, 0..1, as blue, green, yellow, red.
+vec3 ramp_color(float share) {
+    const vec3 colors[4] = vec3[4](vec3(0.02, 0.1, 0.8), vec3(0.05, 0.6, 0.1), vec3(0.9, 0.8, 0.05), vec3(0.8, 0.03, 0.02));
+    float x = 3.0 * clamp(share, 0.0, 1.0);
+    uint first = min(uint(x), 2u);
+    return mix(colors[first], colors[first + 1u], x - float(first));
+}
+
 #endif

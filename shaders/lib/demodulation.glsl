@@ -8,21 +8,18 @@
 
 // Rough lobes show no image: what they reflect moves with the surface.
 const float IMAGE_ROUGHNESS_MAX = 0.25;
-// The least that glass reflects or passes, per channel: its tint divides both.
-const float GLASS_TINT_MIN = 0.04;
+// The least tint, per channel: light is divided by it, and lobes that it does not know of (coats, sheen) must not be lost.
+const float TINT_MIN = 0.04;
 
-// Share of the light that rays bring which reaches the camera: by reflection and through the surface.
+// Share of the light that rays bring which reaches the camera, nearly: by reflection and through the surface.
 vec3 surface_lobe_tint(Surface surface) {
-    switch (surface.mode) {
-        case MODE_REFLECTIVE: return surface.base_color;
-        case MODE_REFRACTIVE: return max(surface.base_color, vec3(GLASS_TINT_MIN));
-        case MODE_PBR: {
-            float v_z = dot(surface.view, surface.shading_normal);
-            vec3 passed = surface_transmits(surface) ? surface.base_color * ((1.0 - surface.metallic) * surface.transmission) : vec3(0.0);
-            return brdf_specular_albedo(surface_brdf(surface), v_z) + passed;
-        }
-        default: return vec3(0.0);
+    vec3 tint = surface.base_color;
+    if (surface.mode == MODE_PBR) {
+        float v_z = dot(surface.view, surface.shading_normal);
+        vec3 passed = surface_transmits(surface) ? surface.base_color * ((1.0 - surface.metallic) * surface.transmission) : vec3(0.0);
+        tint = brdf_specular_albedo(surface_brdf(surface), v_z) + passed;
     }
+    return max(tint, vec3(TINT_MIN));
 }
 
 // Whether the surface shows the image of what its rays meet rather than light of its own.

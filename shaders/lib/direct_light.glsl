@@ -9,6 +9,7 @@
 
 #include "shared/frame.glsl"
 #include "shared/needs.glsl"
+#include "lib/layers.glsl"
 #include "lib/light_rays.glsl"
 #include "lib/random.glsl"
 
@@ -31,6 +32,7 @@ struct Receiver {
     mat3 render_from_local;     // z: shading normal
     vec3 v;                     // local, towards the viewer
     Brdf brdf;
+    Layers layers;
     bool has_diffuse;
     bool lobe_traced;
     Sequence sequence;
@@ -48,12 +50,18 @@ bool surface_reflects(Frame frame, Surface surface) {
     }
 }
 
+// Coats below this roughness are left to the path tracer: no ray follows them here, and drawn directions seldom meet their lobe.
+const float LEAST_COAT_ROUGHNESS = 0.2;
+
 Receiver receiver_begin(Surface surface, bool lobe_traced, Sequence sequence, uint vertex, uint branch) {
     Receiver receiver;
     receiver.surface = surface;
     receiver.render_from_local = basis_around(surface.shading_normal);
     receiver.v = surface.view * receiver.render_from_local;
     receiver.brdf = surface_brdf(surface);
+    Lobes lobes = surface.lobes;
+    lobes.clearcoat *= lobes.clearcoat_roughness >= LEAST_COAT_ROUGHNESS ? 1.0 : 0.0;
+    receiver.layers = layers_begin(lobes, receiver.render_from_local, receiver.v);
     receiver.has_diffuse = max_component(surface_diffuse_albedo(surface)) > 0.0;
     receiver.lobe_traced = lobe_traced;
     receiver.sequence = sequence;
@@ -72,9 +80,15 @@ DirectLight receiver_reflect(Receiver receiver, vec3 direction, vec3 irradiance,
     if (dot(direction, receiver.surface.geometric_normal) <= 0.0) {
         return light;
     }
-    BrdfValue value = brdf_evaluate(receiver.brdf, receiver.v, direction * receiver.render_from_local);
+    vec3 l = direction * receiver.render_from_local;
+    BrdfValue value = brdf_evaluate(receiver.brdf, receiver.v, l);
     light.diffuse = receiver.has_diffuse ? irradiance * value.diffuse : vec3(0.0);
     light.specular = irradiance * value.specular * specular_share;
+    if (NEEDS_LOBES && receiver.layers.flags != 0u && receiver.v.z > 0.0 && l.z > 0.0) {
+        float share = layers_base_share(receiver.layers, receiver.v.z, l.z);
+        light.diffuse *= share;
+        light.specular = share * light.specular + irradiance * layers_evaluate(receiver.layers, receiver.v, l);
+    }
     return light;
 }
 
@@ -167,7 +181,8 @@ void add_environment_light(inout DirectLight sum, Scene scene, Receiver receiver
     vec2 point_xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 2u));
     float strategy_xi = by_map ? sample_1d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 0u)) : 1.0;
     vec2 cell_xi = by_map ? sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_ENVIRONMENT, 1u)) : vec2(0.0);
-    LightRay ray = environment_ray(scene, receiver.surface, receiver.render_from_local, strategy_xi, cell_xi, point_xi);
+    LightRay ray = environment_ray(scene, receiver.surface, receiver.render_from_local, MAP_SHARE_ALONE, strategy_xi, cell_xi,
+        point_xi);
     float specular_share = receiver.lobe_traced ? 0.0 : 1.0;
 #ifdef LIGHT_WITHOUT_RAYS
     ray.irradiance *= receiver.surface.occlusion;

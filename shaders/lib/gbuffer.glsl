@@ -31,7 +31,8 @@ vec4 gbuffer_uv_gradient(vec2 edge1, vec2 edge2, vec2 right, vec2 down) {
 vec2 gbuffer_shape_uv_step(PlacedShape shape, ShapePlace place, CameraRay ray) {
     vec3 origin = ray.origin;
     vec3 direction = ray.direction;
-    if (!shape_line(shape, origin, direction)) {
+    float speed;
+    if (!shape_line(shape, origin, direction, speed)) {
         return vec2(0.0);
     }
     vec3 along = origin + (dot(place.unit - origin, place.normal) / dot(direction, place.normal)) * direction - place.unit;
@@ -73,7 +74,7 @@ GbufferPixel gbuffer_pixel(Frame frame, Scene scene, uvec2 pixel, uint instance_
     uint material_slot = material_index(scene, instance_slot, geometry_index);
     Material material = MaterialTable(scene.materials).at[material_slot];
     bool front = element.is_shape ? geometry == geometry_index : dot(point.normal, ray.direction) < 0.0;
-    Surface surface = surface_shade(material, point, front, attributes, textures_at, -ray.direction);
+    Surface surface = surface_shade(scene, material, point, front, attributes, textures_at, -ray.direction);
 
     vec4 clip = frame.clip_from_render_unjittered * vec4(point.position, 1.0);
     vec3 previous = element_previous_position(scene, instance_slot, geometry_index, element);
@@ -94,7 +95,8 @@ GbufferPixel gbuffer_pixel(Frame frame, Scene scene, uvec2 pixel, uint instance_
 // The surface of a pixel from its targets; id.x > 0.
 Surface surface_from_gbuffer(Frame frame, Scene scene, uvec2 pixel, uvec4 id, uvec2 normal, vec4 base_color, vec2 metallic_roughness) {
     CameraRay ray = camera_ray(frame, camera_sample_position(frame, pixel));
-    SurfacePoint point = element_point(element_on_line(scene, id.x - 1u, id.y, id.z, ray.origin, ray.direction));
+    Element element = element_on_line(scene, id.x - 1u, id.y, id.z, ray.origin, ray.direction);
+    SurfacePoint point = element_point(element);
     Material material = MaterialTable(scene.materials).at[id.w];
     Surface surface;
     surface.position = point.position;
@@ -106,6 +108,13 @@ Surface surface_from_gbuffer(Frame frame, Scene scene, uvec2 pixel, uvec4 id, uv
     surface_set_material(surface, material, base_color.rgb, metallic_roughness);
     surface.occlusion = base_color.a;
     surface.emissive = vec3(0.0);
+    if (material_has_lobes(material)) {
+        Attributes attributes = element_attributes(scene, id.x - 1u, element);
+        vec2 cone = camera_cone(frame);
+        float width_m = cone.x + cone.y * length(point.position - ray.origin);
+        TexturePoint textures_at = cone_texture_point(element, attributes, dot(point.normal, ray.direction), width_m);
+        surface_add_lobes(surface, scene, material_lobes(scene, material), point.normal, attributes, textures_at);
+    }
     return surface;
 }
 #endif

@@ -31,8 +31,10 @@ float emissive_pdf(Scene scene, Material material, float distance_m, float cosin
     return share > 0.0 ? share * distance_m / abs(cosine) * distance_m : 0.0;
 }
 
-// Radiance that a point of a triangle sends to a side; textures at the base level.
-vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Material material, Triangle triangle, vec2 barycentric, bool front) {
+// Radiance that a point of a triangle sends along a direction; textures at the base level.
+vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Material material, Triangle triangle, vec2 barycentric, SurfacePoint point,
+    vec3 leaving) {
+    bool front = dot(leaving, point.normal) > 0.0;
     if (!front && !material_emits_behind(material)) {
         return vec3(0.0);
     }
@@ -40,6 +42,9 @@ vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Material material,
     TexturePoint textures_at;
     textures_at.uv = attributes.uv;
     textures_at.uv_area = float[2](0.0, 0.0);
+    if (material_has_lobes(material)) {
+        return surface_shade(scene, material, point, front, attributes, textures_at, leaving).emissive;
+    }
     return material_emissive(material, textures_at);
 }
 
@@ -59,7 +64,7 @@ LightRay emissive_ray(Scene scene, Surface surface, vec2 choice, vec2 xi) {
     Material material = MaterialTable(scene.materials).at[material_index(scene, emitter.instance, emitter.geometry)];
     vec3 towards = to_light / distance_m;
     float cosine = -dot(towards, point.normal);
-    vec3 radiance = triangle_emission(scene, emitter, material, triangle, barycentric, cosine > 0.0);
+    vec3 radiance = triangle_emission(scene, emitter, material, triangle, barycentric, point, -towards);
     float area = 0.5 * triangle_double_area(triangle);
     LightRay ray;
     ray.direction = towards;
@@ -80,22 +85,27 @@ bool environment_by_map(Scene scene) {
     return NEEDS_ENVIRONMENT_MAP && scene.environment_width > 0u;
 }
 
+// Share of the directions of environment_ray that the map's table draws. Where something else draws the surface's lobes as well and is weighted
+// against it, all of them.
+const float MAP_SHARE_ALONE = 0.5;
+const float MAP_SHARE_WITH_LOBES = 1.0;
+
 // Density of environment_ray, 1/sr.
-float environment_ray_pdf(Scene scene, vec3 normal, vec3 direction) {
+float environment_ray_pdf(Scene scene, vec3 normal, vec3 direction, float map_share) {
     float pdf = cosine_pdf(dot(direction, normal));
-    return environment_by_map(scene) ? 0.5 * (pdf + environment_pdf(scene, direction)) : pdf;
+    return environment_by_map(scene) ? mix(pdf, environment_pdf(scene, direction), map_share) : pdf;
 }
 
 // One direction: from the cosine lobe about the shading normal (the third column), or for a map by turns from that and the map's alias table,
 // weighted by the balance heuristic over both (one-sample model: Veach 1997, section 9.2.4). strategy_xi and cell_xi are for maps only.
-LightRay environment_ray(Scene scene, Surface surface, mat3 render_from_local, float strategy_xi, vec2 cell_xi, vec2 point_xi) {
+LightRay environment_ray(Scene scene, Surface surface, mat3 render_from_local, float map_share, float strategy_xi, vec2 cell_xi, vec2 point_xi) {
     LightRay ray;
-    if (environment_by_map(scene) && strategy_xi < 0.5) {
+    if (environment_by_map(scene) && strategy_xi < map_share) {
         ray.direction = environment_sample(scene, cell_xi, point_xi);
     } else {
         ray.direction = render_from_local * cosine_sample(point_xi);
     }
-    ray.pdf = environment_ray_pdf(scene, surface.shading_normal, ray.direction);
+    ray.pdf = environment_ray_pdf(scene, surface.shading_normal, ray.direction, map_share);
     ray.irradiance = ray.pdf > 0.0 ? environment_radiance(scene, ray.direction) / ray.pdf : vec3(0.0);
     ray.origin = surface_spawn(surface, ray.direction);
     ray.along = ray.direction;

@@ -94,4 +94,9 @@ bool material_transmits(Material material) {
     return NEEDS_REFRACTION && (material.mode == MODE_REFRACTIVE || (material.mode == MODE_PBR && material.transmission > 0.0));
 }
 
+// The camera sees both sides; of other surfaces it passes the back.
+bool material_shows_both_sides(Material material) {
+    return (material.flags & MATERIAL_DOUBLE_SIDED) != 0u || material_transmits(material);
+}
+
 #endif

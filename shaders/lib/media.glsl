@@ -4,7 +4,9 @@
 #ifndef LIB_MEDIA
 #define LIB_MEDIA
 
+#include "shared/needs.glsl"
 #include "shared/scene.glsl"
+#include "lib/dispersion.glsl"
 
 const uint MEDIA_MAX = 4u;
 const uint MEDIUM_AIR = 0xffffffffu;
@@ -74,8 +76,19 @@ bool media_contains(Media media, uint material) {
     return false;
 }
 
-float medium_ior(Scene scene, uint medium) {
-    return medium == MEDIUM_AIR ? 1.0 : MaterialTable(scene.materials).at[medium].ior;
+// 20 / Abbe number.
+float medium_dispersion(Scene scene, uint medium) {
+    uint lobes = !NEEDS_LOBES || medium == MEDIUM_AIR ? 0u : MaterialTable(scene.materials).at[medium].lobes;
+    return lobes == 0u ? 0.0 : LobesTable(scene.material_lobes).at[lobes - 1u].dispersion;
+}
+
+// As a channel sees it (lib/dispersion.glsl).
+float medium_ior(Scene scene, uint medium, uint channel) {
+    if (medium == MEDIUM_AIR) {
+        return 1.0;
+    }
+    float ior = MaterialTable(scene.materials).at[medium].ior;
+    return NEEDS_LOBES ? dispersion_ior(ior, medium_dispersion(scene, medium), channel) : ior;
 }
 
 // Beer and Lambert over a distance. Bounded, so that a compiler that turns exp into exp2 cannot make it infinite: 0 x infinity is not 1.

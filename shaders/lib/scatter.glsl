@@ -25,7 +25,8 @@ struct Sides {
 
 // The surface bounds a volume that light enters.
 bool surface_encloses(Surface surface) {
-    return surface_transmits(surface) && (surface.flags & MATERIAL_HAS_VOLUME) != 0u;
+    bool enters = surface_transmits(surface) || (NEEDS_REFRACTION && surface.mode == MODE_PBR && surface.lobes.diffuse_transmission > 0.0);
+    return enters && (surface.flags & MATERIAL_HAS_VOLUME) != 0u;
 }
 
 // What lies on both sides; the same medium for sheets and opaque surfaces.
@@ -37,11 +38,12 @@ Interface surface_interface(Scene scene, Surface surface, uint material, Media m
     return Interface(medium, medium, media, false);
 }
 
-Sides interface_sides(Scene scene, Interface crossing) {
+// channel: of a path that carries one colour only (lib/dispersion.glsl).
+Sides interface_sides(Scene scene, Interface crossing, uint channel) {
     if (!crossing.bounds_volume) {
         return Sides(1.0, true, false);
     }
-    float eta = medium_ior(scene, crossing.before) / medium_ior(scene, crossing.after);
+    float eta = medium_ior(scene, crossing.before, channel) / medium_ior(scene, crossing.after, channel);
     return Sides(eta, false, crossing.before == crossing.after);
 }
 
@@ -100,7 +102,7 @@ struct CoatShares {
 
 // Inside a volume the Fresnel term is exact, as Schlick knows no total reflection.
 CoatShares coat_shares(Brdf brdf, Sides sides, bool front, float v_dot_h) {
-    CoatShares shares = CoatShares(fresnel_schlick(brdf.f0, brdf.f90, v_dot_h), brdf_base_share(brdf, v_dot_h), v_dot_h);
+    CoatShares shares = CoatShares(brdf_reflectance(brdf, v_dot_h), brdf_base_share(brdf, v_dot_h), v_dot_h);
     if (!sides.thin) {
         float exact = fresnel_dielectric(v_dot_h, sides.eta, shares.cos_t);
         if (!front || exact >= 1.0) {

@@ -6,6 +6,7 @@
 
 #include "shared/scene.glsl"
 #include "lib/basis.glsl"
+#include "lib/intersect.glsl"
 #include "lib/ray_offset.glsl"
 #include "lib/vector.glsl"
 
@@ -149,6 +150,13 @@ ShapePlace box_line_place(vec3 origin, vec3 direction, bool leaving) {
     return place;
 }
 
+// Where a line of unit space enters the shape and leaves it, as multiples of its direction.
+bool unit_line_meets(uint kind, vec3 origin, vec3 direction, out vec2 t) {
+    bool met = kind == SHAPE_SPHERE ? intersect_sphere(origin, direction, vec3(0.0), 1.0, t)
+        : intersect_box(origin, direction, vec3(-1.0), vec3(1.0), t);
+    return met && is_finite(t.x) && is_finite(t.y);
+}
+
 // Where a line of unit space enters the shape or leaves it; beside it, the nearest place (rounding at the outline).
 ShapePlace unit_line_place(uint kind, vec3 origin, vec3 direction, bool leaving) {
     if (kind == SHAPE_SPHERE) {
@@ -157,16 +165,16 @@ ShapePlace unit_line_place(uint kind, vec3 origin, vec3 direction, bool leaving)
     return box_line_place(origin, direction, leaving);
 }
 
-// A line of render space in unit space.
-bool shape_line(PlacedShape shape, inout vec3 origin, inout vec3 direction) {
-    float speed;
+// A line of render space in unit space, where distances are `speed` times as large.
+bool shape_line(PlacedShape shape, inout vec3 origin, inout vec3 direction, out float speed) {
     return line_before(shape.render_from_mesh, origin, direction)
         && (!shape.moved || line_before(shape.mesh_from_primitive, origin, direction))
         && line_in_unit_space(shape.centre, shape.half_extent, origin, direction, speed);
 }
 
 ShapePlace shape_line_place(PlacedShape shape, vec3 origin, vec3 direction, bool leaving) {
-    if (!shape_line(shape, origin, direction)) {
+    float speed;
+    if (!shape_line(shape, origin, direction, speed)) {
         return ShapePlace(vec3(0.0, 0.0, 1.0), vec3(0.0, 0.0, 1.0));
     }
     return unit_line_place(shape.kind, origin, direction, leaving);

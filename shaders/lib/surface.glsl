@@ -6,7 +6,9 @@
 #include "shared/scene.glsl"
 #include "lib/basis.glsl"
 #include "lib/brdf.glsl"
+#include "lib/clearcoat.glsl"
 #include "lib/element.glsl"
+#include "lib/lobes.glsl"
 #include "lib/material.glsl"
 #include "lib/random.glsl"
 
@@ -29,6 +31,7 @@ struct Surface {
     uint mode;
     uint flags;             // of the material
     bool front;             // the viewer is on the front side
+    Lobes lobes;
 };
 
 // A shading normal that the viewer can see and about which the mirror direction does not enter the surface: bent as far as needed, no
@@ -44,16 +47,21 @@ vec3 consistent_normal(vec3 normal, vec3 geometric_normal, vec3 view) {
     return normalize_or(view + grazing, geometric_normal);
 }
 
-// Shading normal on the front side: interpolated, then mapped. Falls back to the triangle's own.
-vec3 front_normal(vec3 geometric_front, Attributes attributes, vec3 tangent_normal) {
+// Tangent, bitangent and interpolated normal, on the front side.
+mat3 front_frame(vec3 geometric_front, Attributes attributes) {
     vec3 normal = normalize_or(attributes.normal, geometric_front);
-    if (tangent_normal.x == 0.0 && tangent_normal.y == 0.0) {
-        return normal;
-    }
     vec3 tangent = attributes.tangent - dot(attributes.tangent, normal) * normal;
     tangent = normalize_or(tangent, basis_around(normal)[0]);
-    vec3 bitangent = attributes.handedness * cross(normal, tangent);
-    return normalize_or(mat3(tangent, bitangent, normal) * tangent_normal, normal);
+    return mat3(tangent, attributes.handedness * cross(normal, tangent), normal);
+}
+
+// Shading normal on the front side: interpolated, then mapped. Falls back to the triangle's own.
+vec3 front_normal(vec3 geometric_front, Attributes attributes, vec3 tangent_normal) {
+    if (tangent_normal.x == 0.0 && tangent_normal.y == 0.0) {
+        return normalize_or(attributes.normal, geometric_front);
+    }
+    mat3 frame = front_frame(geometric_front, attributes);
+    return normalize_or(frame * tangent_normal, frame[2]);
 }
 
 // What the material says, without position and normals.
@@ -68,6 +76,37 @@ void surface_set_material(inout Surface surface, Material material, vec3 base_co
     surface.attenuation_per_m = material.attenuation_per_m;
     surface.mode = material.mode;
     surface.flags = material.flags;
+    surface.lobes = LOBES_NONE;
+}
+
+// Specular-glossiness: its diffuse colour takes what its reflectance leaves; the other numbers are those of a dielectric.
+void surface_apply_glossiness(inout Surface surface, MaterialLobes record, TexturePoint textures_at) {
+    if ((record.flags & LOBE_SPECULAR_GLOSSINESS) != 0u) {
+        vec4 texel = lobe_texel(record.specular_color_texture, textures_at);
+        surface.base_color *= 1.0 - clamp(max_component(surface.specular_color * texel.rgb), 0.0, 1.0);
+        surface.roughness = 1.0 - record.glossiness * texel.a;
+    }
+}
+
+// Lobes, and the textures that lie with them. Position, normals and view are set.
+void surface_add_lobes(inout Surface surface, Scene scene, MaterialLobes record, vec3 geometric_front, Attributes attributes,
+    TexturePoint textures_at) {
+    surface.specular *= lobe_texel(record.specular_texture, textures_at).a;
+    surface.specular_color *= lobe_texel(record.specular_color_texture, textures_at).rgb;
+    surface.transmission *= lobe_texel(record.transmission_texture, textures_at).r;
+    float side = surface.front ? 1.0 : -1.0;
+    surface.lobes = lobes_at(record, textures_at, front_frame(geometric_front, attributes), side, scene.sheen_albedo);
+    if (has_lobe(surface.lobes, LOBE_CLEARCOAT)) {
+        surface.lobes.clearcoat_normal = consistent_normal(surface.lobes.clearcoat_normal, surface.geometric_normal, surface.view);
+    }
+}
+
+// What a coat lets out of the surface's own emission towards the viewer.
+float surface_emission_share(Surface surface) {
+    if (!has_lobe(surface.lobes, LOBE_CLEARCOAT)) {
+        return 1.0;
+    }
+    return 1.0 - clearcoat_weight(Clearcoat(surface.lobes.clearcoat, 0.0, surface.lobes.clearcoat_normal), surface.view);
 }
 
 uint material_index(Scene scene, uint instance_slot, uint geometry) {
@@ -84,7 +123,7 @@ vec3 surface_emission(Material material, TexturePoint point, vec3 base_color, bo
 }
 
 // Fills a Surface from interpolated attributes: shared by raster, camera rays and secondary rays.
-Surface surface_shade(Material material, SurfacePoint point, bool front, Attributes attributes, TexturePoint textures_at, vec3 view) {
+Surface surface_shade(Scene scene, Material material, SurfacePoint point, bool front, Attributes attributes, TexturePoint textures_at, vec3 view) {
     Surface surface;
     surface.position = point.position;
     surface.offset_m = point.offset_m;
@@ -98,21 +137,33 @@ Surface surface_shade(Material material, SurfacePoint point, bool front, Attribu
     surface_set_material(surface, material, max(base_color, vec3(0.0)), material_metallic_roughness(material, textures_at));
     surface.occlusion = material_occlusion(material, textures_at);
     surface.emissive = surface_emission(material, textures_at, surface.base_color, front);
+    if (material_has_lobes(material)) {
+        MaterialLobes record = material_lobes(scene, material);
+        surface_apply_glossiness(surface, record, textures_at);
+        surface_add_lobes(surface, scene, record, point.normal, attributes, textures_at);
+        surface.emissive *= surface_emission_share(surface);
+    }
     return surface;
 }
 
 #ifndef SURFACE_GRADIENTS
+// Where textures are read, with the footprint of a ray cone. cosine: between ray and geometric normal.
+TexturePoint cone_texture_point(Element element, Attributes attributes, float cosine, float cone_width_m) {
+    TexturePoint point;
+    point.uv = attributes.uv;
+    vec2 uv_area = element_uv_density(element) * (cone_width_m * cone_width_m / abs(cosine));
+    point.uv_area = float[2](uv_area.x, uv_area.y); // infinite or NaN where degenerate or edge-on; sample_texture sorts it out
+    return point;
+}
+
 // Surface of an element. travel: unit direction of the ray that met it; cone_width_m: of the ray cone there.
 Surface surface_from_element(Scene scene, uint instance_slot, uint geometry, Element element, vec3 travel, float cone_width_m) {
     SurfacePoint point = element_point(element);
     Attributes attributes = element_attributes(scene, instance_slot, element);
     Material material = MaterialTable(scene.materials).at[material_index(scene, instance_slot, geometry)];
     float cosine = dot(point.normal, travel);
-    TexturePoint textures_at;
-    textures_at.uv = attributes.uv;
-    vec2 uv_area = element_uv_density(element) * (cone_width_m * cone_width_m / abs(cosine));
-    textures_at.uv_area = float[2](uv_area.x, uv_area.y); // infinite or NaN where degenerate or edge-on; sample_texture sorts it out
-    return surface_shade(material, point, cosine < 0.0, attributes, textures_at, -travel);
+    TexturePoint textures_at = cone_texture_point(element, attributes, cosine, cone_width_m);
+    return surface_shade(scene, material, point, cosine < 0.0, attributes, textures_at, -travel);
 }
 
 // Surface at a hit of a secondary ray.
@@ -144,8 +195,25 @@ bool surface_transmits(Surface surface) {
 }
 
 Brdf surface_brdf(Surface surface) {
-    return brdf_from_material(surface.base_color, surface.metallic, surface.roughness, surface.ior, surface.specular,
+    Brdf brdf = brdf_from_material(surface.base_color, surface.metallic, surface.roughness, surface.ior, surface.specular,
         surface.specular_color);
+    if (has_lobe(surface.lobes, LOBE_IRIDESCENCE)) {
+        brdf.film.strength = surface.lobes.iridescence;
+        brdf.film.ior = surface.lobes.film_ior;
+        brdf.film.thickness_nm = surface.lobes.film_nm;
+    }
+    return brdf;
+}
+
+// Local frame: z is the shading normal, x the direction of the larger roughness where there is one.
+mat3 surface_frame(Surface surface) {
+    mat3 frame = basis_around(surface.shading_normal);
+    if (has_lobe(surface.lobes, LOBE_ANISOTROPY)) {
+        vec3 along = surface.lobes.tangent - dot(surface.lobes.tangent, surface.shading_normal) * surface.shading_normal;
+        frame[0] = normalize_or(along, frame[0]);
+        frame[1] = cross(surface.shading_normal, frame[0]);
+    }
+    return frame;
 }
 
 // What direct_diffuse is multiplied with.

@@ -34,6 +34,16 @@ const uint SHOW_HISTORY = 10u;          // source: history_diffuse or history_sp
 const uint SHOW_OCCLUSION = 11u;        // source: gbuffer_base_color
 const uint SHOW_MATERIAL = 12u;         // source_uint: gbuffer_id
 const uint SHOW_TRIANGLE = 13u;         // source_uint: gbuffer_id
+const uint SHOW_PRIMITIVE = 14u;        // source_uint: gbuffer_id
+const uint SHOW_FACING = 15u;           // source_uint: gbuffer_id
+const uint SHOW_RAY_DEPTH = 16u;        // source_uint: ray_depth
+const uint SHOW_SHADOW = 17u;           // source: light_shadow
+// Push.argument0 of post/show_surface.comp.
+const uint SHOW_WIREFRAME = 18u;
+const uint SHOW_BARYCENTRIC = 19u;
+
+// Bit of Push.argument0 of pass light_shadow, beside the number of the light: what the image holds is forgotten.
+const uint LIGHT_SHADOW_FRESH = 0x80000000u;
 
 struct Frame {
     mat4 clip_from_render;              // jittered; reverse depth, far plane at infinity (1 at near, 0 at infinity)
@@ -50,6 +60,7 @@ struct Frame {
     uint64_t accumulator;               // AccumulatorTable; 0 in pipelines without one
     uint64_t sample_index;              // of this frame within the whole sample set, from --sample-offset on
     uint64_t selection;                 // UintTable: bit set by instance slot, outlined by post/window.comp; 0: nothing
+    uint64_t ggx_albedo;                // float[GGX_ALBEDO_SIDE squared]; 0: light is reflected once by rough surfaces (glTF to the letter)
     uint seed;
     uint flags;
     uint light_samples;                 // K: lights a pixel; all of them when there are at most K

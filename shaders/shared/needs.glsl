@@ -15,5 +15,7 @@ layout(constant_id = 8) const bool NEEDS_EMISSION = true;            // any mate
 layout(constant_id = 9) const bool NEEDS_SHADOW_RAYS = true;         // false in the raster pipeline
 layout(constant_id = 10) const bool NEEDS_MOTION = true;             // motion vectors are read
 layout(constant_id = 11) const bool NEEDS_SHAPES = true;             // some mesh holds spheres or boxes instead of triangles
+layout(constant_id = 12) const bool NEEDS_LOBES = true;              // some material has lobes beside metallic-roughness
+layout(constant_id = 13) const bool NEEDS_RAY_DEPTH = false;         // the ray depth is shown
 
 #endif

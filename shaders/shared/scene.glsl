@@ -24,6 +24,18 @@ const uint MATERIAL_HAS_VOLUME = 2u;
 const uint MATERIAL_ALPHA_MASK = 4u;
 const uint MATERIAL_ALPHA_BLEND = 8u;
 
+// MaterialLobes.flags: what the material has
+const uint LOBE_ANISOTROPY = 1u;
+const uint LOBE_CLEARCOAT = 2u;
+const uint LOBE_DISPERSION = 4u;
+const uint LOBE_IRIDESCENCE = 8u;
+const uint LOBE_SHEEN = 16u;
+const uint LOBE_DIFFUSE_TRANSMISSION = 32u;
+const uint LOBE_SPECULAR_GLOSSINESS = 64u;
+
+const uint GGX_ALBEDO_SIDE = 32u;   // cosines and roughnesses of the table Frame.ggx_albedo (lib/ggx_albedo.glsl)
+const uint SHEEN_ALBEDO_SIDE = 32u; // cosines and roughnesses of the table Scene.sheen_albedo (lib/sheen.glsl)
+
 // Instance.flags
 const uint INSTANCE_MIRRORED = 1u;  // determinant below 0: the winding seen in render space is turned over
 
@@ -35,6 +47,9 @@ const uint GEOMETRY_SHAPES = 4u;    // spheres and boxes: `positions` is the add
 // Shape.kind
 const uint SHAPE_SPHERE = 0u;
 const uint SHAPE_BOX = 1u;
+
+// Vertices that raster draws for a shape: the box around it.
+const uint SHAPE_VERTICES = 36u;
 
 // Light.kind
 const uint LIGHT_POINT = 0u;
@@ -105,11 +120,45 @@ struct Material {
     uint mode;
     uint flags;
     uint medium_priority;       // where volumes overlap, the higher one counts (Schmidt and Budge 2002); equal: the one entered last
+    uint lobes;                 // 1 + index into Scene.material_lobes; 0: none
     TextureUse base_color_texture;
     TextureUse metallic_roughness_texture;
     TextureUse normal_texture;
     TextureUse occlusion_texture;
     TextureUse emissive_texture;
+};
+
+// What most materials go without: lobes and their textures.
+struct MaterialLobes {
+    vec3 sheen_color;
+    float sheen_roughness;                              // perceptual
+    vec3 diffuse_transmission_color;
+    float diffuse_transmission;                         // share of the diffuse light
+    vec2 anisotropy_direction;                          // cosine and sine of the rotation from the tangent
+    float anisotropy;
+    float clearcoat;
+    float clearcoat_roughness;                          // perceptual
+    float clearcoat_normal_scale;
+    float iridescence;
+    float iridescence_ior;
+    float iridescence_thickness_min_nm;
+    float iridescence_thickness_max_nm;
+    float dispersion;                                   // 20 / Abbe number
+    float glossiness;                                   // of specular-glossiness, whose reflectance is Material.specular_color
+    uint flags;
+    TextureUse specular_texture;                        // a
+    TextureUse specular_color_texture;                  // rgb; of specular-glossiness its glossiness in a
+    TextureUse transmission_texture;                    // r
+    TextureUse anisotropy_texture;                      // rg: direction, b: strength
+    TextureUse clearcoat_texture;                       // r
+    TextureUse clearcoat_roughness_texture;             // g
+    TextureUse clearcoat_normal_texture;
+    TextureUse iridescence_texture;                     // r
+    TextureUse iridescence_thickness_texture;           // g
+    TextureUse sheen_color_texture;
+    TextureUse sheen_roughness_texture;                 // a
+    TextureUse diffuse_transmission_texture;            // a
+    TextureUse diffuse_transmission_color_texture;
 };
 
 struct Light {
@@ -150,6 +199,8 @@ struct Scene {
     uint64_t emissive_alias;        // AliasEntry[emissive_count], by area x luminance
     uint64_t environment_alias;     // AliasEntry[environment_width * environment_height], by radiance x solid angle
     uint64_t draw_instances;        // uint[]: instance slots, indexed by gl_InstanceIndex of the raster draws
+    uint64_t material_lobes;        // MaterialLobes[]
+    uint64_t sheen_albedo;          // float[SHEEN_ALBEDO_SIDE squared]
     uint light_count;
     uint emissive_count;
     uint environment_width;         // of the alias table's grid; 0: constant environment
@@ -167,6 +218,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Sha
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer AttributeTable { VertexAttributes at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer UintTable { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaterialTable { Material at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LobesTable { MaterialLobes at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SheenAlbedoTable { float at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightTable { Light at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer AliasTable { AliasEntry at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer EmissiveTable { EmissiveTriangle at[]; };

@@ -1,26 +1,27 @@
-//! When acceleration structures are built, refitted, rebuilt, compacted and swapped, counted row by row of the design's table;
-//! and that the picture is that of a fresh scene after each.
+//! When acceleration structures are built, refitted, rebuilt, compacted and swapped, counted row by row of the table
+//! "Invalidation" in ARCHITECTURE.md; and that the picture is that of a fresh scene after each.
 //!
-//! | row of the table | tests here, in `invalidation.rs` (i), `deform.rs` (d) and `churn/rows.rs` (r, through a session) |
+//! | event | tests here, in `invalidation.rs` (i), `accel_edges.rs` (e), `deform.rs` (d), `churn/rows.rs` (r, through a session) |
 //! |---|---|
-//! | move, rotate, scale | `a_moved_instance_is_right_in_the_next_frame` (i), `a_tree_whose_instances_have_moved_far_is_built_anew`, `what_moves_or_hides_costs_its_records_and_a_refit` (r) |
-//! | hide; an active state | `hiding_is_a_mask_and_a_refit`, `hiding_and_degenerating_come_back_unharmed` (i) |
-//! | move a primitive | `a_moved_primitive_is_right_in_the_next_frame_and_refitted_from_then_on`, `where_a_refit_does_not_pay_a_moved_primitive_is_built_in_place` |
-//! | morph, skin | `a_pose_uploads_its_joints_and_refits_one_tree` (d), `a_primitive_a_weight_and_a_joint_cost_the_trees_that_they_bend` (r) |
-//! | quality decays | `what_refits_have_loosened_is_rebuilt_in_the_background_and_swapped_without_a_reset`, `an_edit_while_the_background_builds_is_not_lost` |
-//! | add, remove a node | `adding_builds_what_is_new_only_and_removing_nothing` (i), `who_takes_anothers_slot_has_the_tree_built_anew`, `first_builds_past_the_budget_come_later_while_frames_go_on` |
-//! | add, remove a prefab | `an_instance_builds_what_it_does_not_share_and_its_end_builds_nothing` (r) |
-//! | material; a flip of opacity | `material_and_light_edits_build_nothing` (i), `a_material_that_lets_light_through_takes_another_blas_and_no_other_is_touched` |
+//! | move, rotate, scale a node | `a_moved_instance_is_right_in_the_next_frame` (i), `a_tree_whose_instances_have_moved_far_is_built_anew`, `what_moves_or_hides_costs_its_records_and_a_refit` (r), `what_nobody_sees_moves_without_a_reset` (e) |
+//! | hide or show; seen by the camera, casts shadows | `hiding_is_a_mask_and_a_refit`, `masks_tell_the_camera_from_shadows_and_mirrors`, `hiding_and_degenerating_come_back_unharmed` (i) |
+//! | assign a material | `a_material_that_is_given_builds_a_tree_only_where_rays_pass` (r) |
+//! | add or remove | `adding_builds_what_is_new_only_and_removing_nothing` (i), `who_takes_anothers_slot_has_the_tree_built_anew`, `an_instance_builds_what_it_does_not_share_and_its_end_builds_nothing` (r) |
+//! | move a primitive in its mesh | `a_moved_primitive_is_right_in_the_next_frame_and_refitted_from_then_on`, `where_a_refit_does_not_pay_a_moved_primitive_is_built_in_place` |
+//! | pose: joints, morph weights | `a_pose_uploads_its_joints_and_refits_one_tree` (d), `a_primitive_a_weight_and_a_joint_cost_the_trees_that_they_bend` (r) |
+//! | time step of an animation | `a_time_step_costs_what_the_clip_moves_and_bends` (r), `history_is_reprojected_by_moves_and_dropped_with_everything` (r) |
+//! | change a material | `material_and_light_edits_build_nothing` (i), `a_material_that_lets_light_through_takes_another_blas_and_no_other_is_touched`, `a_material_that_begins_to_shine_touches_no_tree` (r) |
 //! | light, environment | `lights_and_environment_touch_no_structure`, `materials_lights_and_surroundings_cost_their_records` (r) |
-//! | time step | `a_time_step_costs_what_the_clip_moves_and_bends` (r), `history_is_reprojected_by_moves_and_dropped_with_everything` (r) |
+//! | render origin | `views_cost_no_structure` (r), `history_survives_moves_and_ends_with_its_targets` (i) |
+//! | a first build that the background has finished | `first_builds_past_the_budget_come_later_while_frames_go_on` |
+//! | BLAS compacted, rebuilt for quality, or built to be traced fast, in the background | `an_edited_mesh_that_rests_is_built_to_be_traced_fast_and_compacted`, `what_refits_have_loosened_is_rebuilt_in_the_background_and_swapped_without_a_reset`, `what_was_begun_for_another_mesh_is_dropped` |
 //! | camera | `moving_one_camera_resets_that_view_alone` (i), `views_cost_no_structure` (r) |
-//! | render origin | `views_cost_no_structure` (r): all instances have moved far, so that the TLAS is built instead of refitted |
-//! | pipeline, quality | `every_other_event_resets_and_says_why` (i), `views_cost_no_structure` (r) |
-//! | shader reloaded | none: shaders are read when a pipeline is made |
-//! | size of the view | `every_other_event_resets_and_says_why` (i), `views_cost_no_structure` (r) |
-//! | needs | `what_only_changes_the_display_keeps_the_samples` (i), `what_is_no_event_keeps_the_samples` (r) |
-//! | compacted, rebuilt in the background | `an_edited_mesh_that_rests_is_built_to_be_traced_fast_and_compacted`, `what_was_begun_for_another_mesh_is_dropped` |
-//! | exposure, tone map, overlay, selection, window move | `what_only_changes_the_display_keeps_the_samples` (i), `what_is_no_event_keeps_the_samples` (r), `idle_frames_do_nothing_at_all` |
+//! | size of the view | `every_other_event_resets_and_says_why` (i), `another_resolution_keeps_the_reason_of_what_moved` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
+//! | pipeline, depth, rays, seed, jitter, any other setting | `every_other_event_resets_and_says_why` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
+//! | needs (auto or all) | `what_only_changes_the_display_keeps_the_samples` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
+//! | exposure, tone map, what is shown, selection | `what_only_changes_the_display_keeps_the_samples` (i), `what_is_no_event_keeps_the_samples` (r), `history_survives_moves_and_ends_with_its_targets` (i) |
+//!
+//! A reloaded shader has no row: shaders are read when a pipeline is made.
 
 use std::sync::Arc;
 

@@ -28,6 +28,10 @@ fn number(row: &Value, name: &str) -> u64 {
     row[name].as_u64().expect("a whole number")
 }
 
+fn median(row: &Value, name: &str) -> f64 {
+    row[name]["median"].as_f64().expect("a median")
+}
+
 #[test]
 fn a_move_costs_the_same_bytes_in_any_document_and_is_seen_at_once() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -45,15 +49,27 @@ fn a_move_costs_the_same_bytes_in_any_document_and_is_seen_at_once() {
             assert_eq!(number(row, "latency_frames"), 1, "{row}");
             assert_eq!((number(row, "blas_builds"), number(row, "tlas_builds")), (0, 0), "{row}");
             assert_eq!(number(row, "tlas_refits"), number(row, "moves"), "{row}");
-            assert!(row["scene_ms"]["median"].as_f64() > Some(0.0), "{row}");
-            assert!(row["accel_ms"]["median"].as_f64() > Some(0.0), "{row}");
+            let host = rows(row, "host");
+            assert!(host.len() == 3 && host.iter().all(|of| median(of, "scene_ms") > 0.0), "{row}");
+            for name in ["tlas_ms", "descriptors_ms", "bare_refit_ms", "bare_refit_at_rest_ms"] {
+                assert!(median(row, name) > 0.0, "{name}: {row}");
+            }
+            let parts_ms = median(row, "tlas_ms") + median(row, "descriptors_ms");
+            assert!(median(row, "accel_ms") > 0.5 * parts_ms && row["tlas_over_bare"].as_f64() > Some(0.0));
             // The record, and what the pass that writes its descriptor is told; then the record once more.
             assert!((record + 4..=record + 64).contains(&number(row, "moved_bytes")), "{row}");
             assert_eq!(number(row, "settled_bytes"), record, "{row}");
         }
         assert_eq!(of_pipeline[1]["moved_bytes"], of_pipeline[2]["moved_bytes"]);
     }
-    assert_eq!(rows(moves, "edits").len(), 9 * 3);
+    let edits = rows(moves, "edits");
+    assert_eq!(edits.len(), 9 * 3);
+    for row in edits {
+        let structural = ["delete", "copy"].iter().any(|edit| row["edit"] == *edit || row["undone"] == *edit);
+        // A new material has another BLAS only where opacity differs, which it does not here.
+        assert_eq!(number(row, "tlas_builds"), if structural { 3 } else { 0 }, "{row}");
+        assert!(!structural || (median(row, "tlas_build_ms") > 0.0 && median(row, "bare_build_ms") > 0.0));
+    }
     for title in ["One node moves: the host", "One node moves: the device", "Other edits"] {
         assert!(run.stdout.contains(title), "{}", run.stdout);
     }
@@ -78,6 +94,16 @@ fn structures_and_skinned_meshes_are_measured() {
             row["build_fast_trace"]["ms"].as_f64() > Some(0.0) && row["refit"]["ms"].as_f64() > Some(0.0)
         );
     }
+    let steps: Vec<(u64, bool, bool)> = rows(structures, "in_session")
+        .iter()
+        .map(|row| {
+            let timed = median(row, "blas_ms") > 0.0 && median(row, "bare_ms") > 0.0;
+            (number(row, "builds"), number(row, "builds") + number(row, "refits") == 3, timed)
+        })
+        .collect();
+    // Whether the last one refits is the device's choice.
+    assert_eq!(steps[..2], [(3, true, true); 2], "{structures}");
+    assert!(steps.len() == 3 && steps[2].1 && steps[2].2, "{structures}");
     let dances = rows(&figures["accel"]["skinned"], "rows");
     let work: Vec<(u64, u64, u64)> = dances
         .iter()
@@ -94,13 +120,18 @@ fn three_hundred_edits_taken_back_leave_the_device_as_it_was() {
     let soak = &figures["accel"]["soak"];
     let looks = rows(soak, "looks");
     let cycles: Vec<u64> = looks.iter().map(|look| number(look, "cycles")).collect();
-    assert_eq!(cycles, [100, 300]);
-    assert_eq!(looks[0]["device_bytes"], looks[1]["device_bytes"], "bytes by kind");
+    assert_eq!(cycles, [100, 150, 300]);
+    assert!(
+        looks.iter().all(|look| look["device_bytes"] == looks[0]["device_bytes"]),
+        "bytes by kind: {looks:?}"
+    );
     for kind in ["acceleration_structures", "geometry", "tables", "targets", "staging"] {
         assert!(looks[0]["device_bytes"][kind].as_u64() > Some(0), "{kind}: {looks:?}");
     }
     assert_eq!(soak["document_unchanged"], true);
-    assert_eq!(soak["steady"]["device_growth_bytes"], 0);
+    assert_eq!(soak["device"], json!({ "growth_bytes": 0, "steady": true }));
+    // What the process holds is printed, not judged here: other tests share its allocator's moods.
+    assert!(soak["process"]["growth_share"].is_f64() && soak["process"]["noise_share"].is_f64(), "{soak}");
 }
 
 #[test]

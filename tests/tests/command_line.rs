@@ -57,7 +57,7 @@ fn the_gallery_renders_to_a_png_and_tells_what_it_did() {
         json_of(&render(folder.path(), &gallery(), &["-o", "out/a.png", "--samples", "4", "--json"]));
     assert_eq!((&figures["samples"], &figures["size"]), (&Value::from(4), &serde_json::json!([64, 48])));
     assert_eq!(figures["non_finite_samples"], 0);
-    assert_eq!(figures["pipeline"], "hybrid");
+    assert_eq!((&figures["pipeline"], &figures["sampler"]), (&Value::from("hybrid"), &Value::from("sobol")));
     for key in ["device", "version", "reset_reason"] {
         assert!(figures[key].as_str().is_some_and(|text| !text.is_empty()), "{key}: {}", figures[key]);
     }
@@ -88,6 +88,13 @@ fn the_same_command_writes_the_same_bytes() {
     let first = bytes("a.png", &[]);
     assert_eq!(first, bytes("b.png", &[]));
     assert_ne!(first, bytes("c.png", &["--seed", "5"]));
+    for sampler in ["halton", "hammersley", "independent", "blue-noise"] {
+        let other = bytes("d.png", &["--sampler", sampler]);
+        assert!(other != first && other == bytes("e.png", &["--sampler", sampler]), "{sampler}");
+    }
+    let json = &["-o", "f.png", "--samples", "1", "--sampler", "blue-noise", "--json"];
+    assert_eq!(json_of(&render(folder.path(), &gallery(), json))["sampler"], "blue-noise");
+    assert_eq!(render(folder.path(), &gallery(), &["-o", "g.png", "--sampler", "white"]).code, Some(2));
 }
 
 #[test]
@@ -186,6 +193,28 @@ fn every_pipeline_and_target_can_be_asked_for() {
         let run = render(folder.path(), &gallery(), &["-o", "c.png", "--samples", "1", "--show", target]);
         assert_eq!(run.code, Some(0), "{}", run.stderr);
         assert_ne!(bytes("c.png"), bytes("a.png"), "{target}");
+    }
+}
+
+#[test]
+fn the_shadow_of_a_light_is_chosen_by_name_or_number() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let shot = |output: &str, light: &[&str]| {
+        let mut args = vec!["-o", output, "--samples", "1", "--show", "shadow"];
+        args.extend(light);
+        render(folder.path(), &gallery(), &args)
+    };
+    for (output, light) in [("1.png", "1"), ("2.png", "2"), ("sun.png", "Sun")] {
+        let run = shot(output, &["--show-light", light]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+    }
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect("an image");
+    assert_ne!(bytes("1.png"), bytes("2.png"));
+    assert!(bytes("sun.png") == bytes("1.png") || bytes("sun.png") == bytes("2.png"));
+    for unknown in ["Moon", "0", "99"] {
+        let run = shot("no.png", &["--show-light", unknown]);
+        assert_eq!(run.code, Some(1), "{unknown}");
+        assert!(run.stderr.contains("Sun"), "the message names those that there are: {}", run.stderr);
     }
 }
 

@@ -99,8 +99,7 @@ fn while_moving(studio: &mut Studio, frames: u16) -> Vec<[f32; 3]> {
 #[test]
 fn a_soft_shadow_in_a_mirror_converges_while_the_camera_moves() {
     let (scene, _) = shadow_in_mirror();
-    let reference =
-        Studio::of(EXTENT, still(Pipeline::Hybrid), &scene.delta, passing_by(0.0)).mean(256).mean;
+    let reference = Studio::of(EXTENT, still(Pipeline::Hybrid), &scene.delta, passing_by(0.0)).mean(256).mean;
     let noisy = first_frame(still(Pipeline::Hybrid), &scene.delta, passing_by(0.0));
     for spatial in [false, true] {
         let moving = ViewSettings { spatial, ..settings(Pipeline::Hybrid) };

@@ -198,6 +198,74 @@ fn every_other_event_resets_and_says_why() {
 }
 
 #[test]
+fn another_resolution_keeps_the_reason_of_what_moved() {
+    let (mut studio, ball) = studio_of(Pipeline::Hybrid, 0.0, 0.0);
+    studio.frames(2);
+    let told = |studio: &mut Studio| {
+        let figures = studio.statistics();
+        (figures.samples, figures.reset_reason, studio.view_mut().extent())
+    };
+    let small = EXTENT.map(|side| side / 2);
+    studio.view_mut().set_divisor(2);
+    studio.frame(&moved(ball, 0.3));
+    assert_eq!(told(&mut studio), (1, String::from("moved Ball"), small));
+    // Still again: the picture is begun anew at full resolution, because of the same move.
+    studio.frames(2);
+    studio.view_mut().set_divisor(1);
+    studio.frames(1);
+    assert_eq!(told(&mut studio), (1, String::from("moved Ball"), EXTENT));
+    studio.frames(2);
+    studio.view_mut().resize(small);
+    studio.view_mut().set_camera(camera_at(Vec3::new(0.1, 1.5, 4.0), Vec3::ZERO, 0.7));
+    studio.frames(1);
+    assert_eq!(told(&mut studio), (1, String::from("camera"), small));
+    studio.view_mut().resize(EXTENT);
+    studio.frames(1);
+    assert_eq!(told(&mut studio), (1, String::from("size of the view"), EXTENT));
+}
+
+/// What happens to a view with a ball.
+type Event = fn(&mut Studio, InstanceId);
+
+#[test]
+fn history_survives_moves_and_ends_with_its_targets() {
+    let (mut studio, ball) = studio_of(Pipeline::Hybrid, -0.6, 0.3);
+    studio.set(|settings| settings.show = Show::History);
+    let mut x = -0.6;
+    // Mean length of the history in a frame in which the ball has moved a little.
+    let mut moving = |studio: &mut Studio| {
+        x += 0.001;
+        studio.frame(&moved(ball, x));
+        let display = studio.display();
+        display.iter().map(|pixel| pixel[0]).sum::<f32>() / display.len() as f32
+    };
+    let events: [(&str, bool, Event); 7] = [
+        ("exposure", true, |studio, _| studio.set(|settings| settings.exposure_ev = 0.01)),
+        ("selection", true, |studio, ball| {
+            studio.renderer.select(studio.view, [ball].into_iter()).expect("a view");
+        }),
+        ("a move", true, |studio, ball| studio.frame(&moved(ball, -0.5))),
+        ("size", false, |studio, _| studio.view_mut().resize([32, 24])),
+        ("needs", false, |studio, _| studio.set(|settings| settings.needs = NeedsMode::All)),
+        ("settings", false, |studio, _| studio.set(|settings| settings.max_depth = 2)),
+        ("render origin", false, |studio, _| {
+            studio.frame(&SceneDelta { render_origin_changed: true, ..SceneDelta::default() });
+        }),
+    ];
+    for (what, kept, event) in events {
+        let before = (0..10).map(|_| moving(&mut studio)).last().expect("a length");
+        event(&mut studio, ball);
+        studio.frames(1);
+        let after = moving(&mut studio);
+        if kept {
+            assert!(after > 0.9 * before, "{what}: {before}, then {after}");
+        } else {
+            assert!(after < 0.5 * before, "{what}: {before}, then {after}");
+        }
+    }
+}
+
+#[test]
 fn moving_one_camera_resets_that_view_alone() {
     let (mut studio, ball) = studio_of(Pipeline::Hybrid, 0.0, 0.0);
     let other =

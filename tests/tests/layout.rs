@@ -5,9 +5,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use caustica_renderer::Needs;
 use caustica_renderer::gpu_types::twins;
 use caustica_renderer::shader::{ShaderSources, SpirvCache, compile, reflect};
+use caustica_renderer::{Needs, Sampler, Sampling};
 use caustica_tests::compute::shader_text;
 use caustica_tests::{repository, shader_folder};
 
@@ -208,7 +208,7 @@ fn constants_are_the_same_on_both_sides() {
         device.extend(constants(&shader_text(&file), "const uint ", "="));
     }
     assert!(device.len() > 30, "only {} constants were found", device.len());
-    for beginning in ["MASK_", "GEOMETRY_", "TLAS_", "RAY_", "SHOW_"] {
+    for beginning in ["MASK_", "GEOMETRY_", "LOBE_", "TLAS_", "RAY_", "SHOW_"] {
         assert!(device.keys().any(|name| name.starts_with(beginning)), "no {beginning}* was found");
     }
     for (name, value) in &device {
@@ -236,6 +236,9 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         motion: false,
         shapes: false,
         primary_rays: false,
+        paths: false,
+        lobes: false,
+        ray_depth: false,
     };
     let cases = [
         ("LIGHTS", Needs { lights: true, ..nothing }),
@@ -250,6 +253,8 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         ("SHADOW_RAYS", Needs { shadow_rays: true, ..nothing }),
         ("MOTION", Needs { motion: true, ..nothing }),
         ("SHAPES", Needs { shapes: true, ..nothing }),
+        ("LOBES", Needs { lobes: true, ..nothing }),
+        ("RAY_DEPTH", Needs { ray_depth: true, ..nothing }),
     ];
     let text = shader_text("shared/needs.glsl");
     let count = text.matches("constant_id").count();
@@ -262,4 +267,23 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         assert_eq!(set, [(id.parse().expect("a number"), 1)], "{name}");
         assert_eq!(needs.specialization().values.len(), count);
     }
+}
+
+#[test]
+fn the_sampler_is_specialised_alike_on_both_sides() {
+    let text = shader_text("shared/sampler.glsl");
+    let id_of = |name: &str| {
+        let line = text.lines().find(|line| line.contains(&format!(" const uint {name} ="))).expect(name);
+        let id = line.split("constant_id = ").nth(1).and_then(|rest| rest.split(')').next()).expect(name);
+        id.parse::<u32>().expect("a number")
+    };
+    let device = constants(&text, "const uint ", "=");
+    for sampler in Sampler::ALL {
+        let name = format!("SAMPLER_{}", sampler.name().replace('-', "_").to_uppercase());
+        let size = if sampler == Sampler::Hammersley { 50 } else { Sampling::UNKNOWN_SET };
+        let expected = [(id_of("SAMPLER"), device[&name]), (id_of("HAMMERSLEY_SIZE"), size)];
+        assert_eq!(Sampling::of(sampler, Some(100)).specialization().values, expected, "{name}");
+    }
+    let needs = shader_text("shared/needs.glsl").matches("constant_id").count() as u32;
+    assert!(needs <= id_of("SAMPLER"), "the constants of needs.glsl have grown into these");
 }

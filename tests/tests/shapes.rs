@@ -1,4 +1,4 @@
-//! Spheres and boxes that rays meet without triangles: against fine triangle meshes, from inside, through glass, moved,
+//! Spheres and boxes without triangles, drawn and met by rays: against fine triangle meshes, from inside, through glass, moved,
 //! stretched, at every scale.
 
 use caustica_renderer::delta::{AlphaMode, Camera, Light, Material, Mesh, SceneDelta, Shape};
@@ -12,7 +12,7 @@ use caustica_tests::studio::Studio;
 use glam::{Affine3A, Mat3, Quat, Vec3};
 
 const EXTENT: [u32; 2] = [96, 64];
-const RAYS: [Pipeline; 2] = [Pipeline::Hybrid, Pipeline::Raytraced];
+const PIPELINES: [Pipeline; 3] = [Pipeline::Raster, Pipeline::Hybrid, Pipeline::Raytraced];
 
 fn still(pipeline: Pipeline) -> ViewSettings {
     ViewSettings { pipeline, jitter: false, ..ViewSettings::default() }
@@ -74,7 +74,7 @@ fn room(made: Made) -> (Scene, Camera) {
 
 #[test]
 fn shapes_look_like_fine_triangle_meshes() {
-    for pipeline in RAYS {
+    for pipeline in PIPELINES {
         let image = |made| {
             let (scene, camera) = room(made);
             Studio::of(EXTENT, still(pipeline), &scene.delta, camera).mean(1)
@@ -90,7 +90,7 @@ fn shapes_look_like_fine_triangle_meshes() {
 #[test]
 fn textures_lie_on_shapes_as_on_triangles() {
     // The sphere's longitude and latitude, and the face of a box that a square with the same texture covers.
-    for pipeline in RAYS {
+    for pipeline in PIPELINES {
         let image = |left: Mesh, right: Mesh, right_at: Affine3A| {
             let mut scene = Scene::new();
             let mut paint = checker(2, 10, 250);
@@ -124,7 +124,7 @@ fn textures_lie_on_shapes_as_on_triangles() {
 fn from_inside_the_far_side_is_seen() {
     let both = Material { double_sided: true, ..lambert(0.6) };
     let mut stage = Stage::default();
-    for pipeline in RAYS {
+    for pipeline in PIPELINES {
         let mut image = |made: Made, as_box: bool, material: &Material| {
             let mut scene = Scene::new();
             let mesh = if as_box { made.cube(3.0) } else { made.ball(1.5) };
@@ -164,7 +164,7 @@ fn glass_house(made: Made) -> (Scene, Camera) {
 
 #[test]
 fn glass_shapes_bend_and_tint_light_as_glass_triangles_do() {
-    for pipeline in RAYS {
+    for pipeline in PIPELINES {
         let image = |made| {
             let (scene, camera) = glass_house(made);
             Studio::of(EXTENT, still(pipeline), &scene.delta, camera).mean(48)
@@ -206,7 +206,7 @@ fn nothing_is_lost_or_gained_in_a_furnace_of_shapes() {
 fn holes_and_thin_coats_are_those_of_triangles() {
     // Masked: holes by texture. Blended: either side of a shape is met or passed by itself, so a quarter is seen through.
     let mut stage = Stage::default();
-    for pipeline in RAYS {
+    for pipeline in PIPELINES {
         let mut image = |made: Made, alpha: AlphaMode| {
             let mut scene = Scene::new();
             let mut paint = checker(8, 0, 255);
@@ -271,7 +271,7 @@ fn a_stretched_sphere_is_an_ellipsoid() {
     ));
     let mirrored = Affine3A::from_scale(Vec3::new(-1.0, 0.6, 1.2)) * Affine3A::from_rotation_z(0.5);
     let (mut stage, mut last) = (Stage::default(), None);
-    for pipeline in RAYS {
+    for pipeline in PIPELINES {
         for (name, map) in [("squeezed", squeezed), ("sheared", sheared), ("mirrored", mirrored)] {
             // The map inside the mesh, and as the instance's own; material: smooth, so that normals are seen in mirror images.
             let mut image = |made: Made, inside: bool| {

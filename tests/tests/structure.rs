@@ -209,3 +209,48 @@ fn files_stay_short() {
     }
     assert!(long.is_empty(), "past {LINES} lines look for the seam:\n{}", long.join("\n"));
 }
+
+/// The rows of the first table below a heading, cells trimmed, without the two lines of its head.
+fn table_below(text: &str, heading: &str) -> Vec<Vec<String>> {
+    let lines = text.lines().map(|line| line.trim_start_matches("//!").trim());
+    let table = lines.skip_while(|line| *line != heading).skip_while(|line| !line.starts_with('|'));
+    let cells = |line: &str| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect();
+    table.take_while(|line| line.starts_with('|')).skip(2).map(cells).collect()
+}
+
+/// What is wrong with the list of tests of the rows of a table, in words. `is_test`: whether there is a function of that name.
+fn list_faults(rows: &[Vec<String>], list: &[Vec<String>], is_test: impl Fn(&str) -> bool) -> Vec<String> {
+    let events = |table: &[Vec<String>]| table.iter().map(|row| row[0].clone()).collect::<Vec<_>>();
+    let mut faults = Vec::new();
+    if events(rows) != events(list) {
+        faults.push(format!("other rows: {:?} and {:?}", events(rows), events(list)));
+    }
+    for row in list {
+        let tests: Vec<&str> =
+            row[1].split('`').skip(1).step_by(2).filter(|word| !word.ends_with(".rs")).collect();
+        let missing = tests.iter().filter(|test| !is_test(test));
+        faults.extend(missing.map(|test| format!("{}: there is no test {test}", row[0])));
+        if tests.is_empty() {
+            faults.push(format!("{} has no test", row[0]));
+        }
+    }
+    faults
+}
+
+#[test]
+fn each_row_of_the_table_of_invalidation_has_a_test() {
+    let read = |path: &str| std::fs::read_to_string(repository().join(path)).expect(path);
+    let rows = table_below(&read("ARCHITECTURE.md"), "## Invalidation");
+    let head = read("tests/tests/acceleration.rs");
+    let list = table_below(&head, "");
+    let files = ["acceleration", "accel_edges", "invalidation", "deform", "churn/rows"];
+    let text: String = files.iter().map(|name| read(&format!("tests/tests/{name}.rs"))).collect();
+    let is_test = |name: &str| text.contains(&format!("fn {name}("));
+    assert!(rows.len() > 10);
+    assert_eq!(list_faults(&rows, &list, is_test), Vec::<String>::new());
+    let mut damaged = list;
+    damaged.pop();
+    damaged[0][1] = String::from("`a_test_that_is_gone`");
+    damaged[1][1].clear();
+    assert_eq!(list_faults(&rows, &damaged, is_test).len(), 3);
+}

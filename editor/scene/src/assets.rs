@@ -4,6 +4,7 @@
 mod deform;
 mod environment;
 mod light;
+mod lobes;
 mod material;
 mod mesh;
 mod texture;
@@ -12,6 +13,7 @@ pub(crate) use deform::{Bounds, join, moved};
 pub use deform::{DeformPose, MorphTarget, SkinData};
 pub use environment::{Environment, EnvironmentFile, RadianceMap};
 pub use light::{Camera, Light, LightKind, Projection};
+pub use lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, SpecularGlossiness};
 pub use material::{AlphaMode, Material, ShadingMode};
 pub use mesh::{Mesh, MeshData, Primitive};
 pub use texture::{Sampler, Texture, TextureUse, Wrap};

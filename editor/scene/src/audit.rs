@@ -261,11 +261,18 @@ impl Audit<'_> {
         ];
         let mut outside: BTreeMap<&str, f32> = ranged
             .into_iter()
+            .chain(lobe_shares(material).into_iter().map(|(what, value)| (what, value, &unit)))
             .filter(|(_, value, range)| value.is_finite() && !range.contains(value))
             .map(|(what, value, _)| (what, value))
             .collect();
         if material.ior < 1.0 {
             outside.insert("index of refraction", material.ior);
+        }
+        if let Some(film) = material.iridescence.as_ref().filter(|film| film.ior < 1.0) {
+            outside.insert("index of the film", film.ior);
+        }
+        if material.dispersion < 0.0 {
+            outside.insert("dispersion", material.dispersion);
         }
         if material.emitted_radiance().min_element() < 0.0 {
             outside.insert("emission", material.emitted_radiance().min_element());
@@ -295,6 +302,34 @@ impl Audit<'_> {
             self.add(Severity::Info, Subject::Scene, "scene", message);
         }
     }
+}
+
+/// What lobes hold that has to be within 0 and 1.
+fn lobe_shares(material: &Material) -> Vec<(&'static str, f32)> {
+    let mut shares = Vec::new();
+    if let Some(lobe) = &material.anisotropy {
+        shares.push(("anisotropy", lobe.strength));
+    }
+    if let Some(lobe) = &material.clearcoat {
+        shares.extend([("clear coat", lobe.factor), ("roughness of the clear coat", lobe.roughness)]);
+    }
+    if let Some(lobe) = &material.iridescence {
+        shares.push(("iridescence", lobe.factor));
+    }
+    if let Some(lobe) = &material.sheen {
+        let (low, high) = (lobe.color.min_element(), lobe.color.max_element());
+        shares.extend([("sheen", low), ("sheen", high), ("roughness of the sheen", lobe.roughness)]);
+    }
+    if let Some(lobe) = &material.diffuse_transmission {
+        let (low, high) = (lobe.color.min_element(), lobe.color.max_element());
+        let tint = "tint of diffuse transmission";
+        shares.extend([("diffuse transmission", lobe.factor), (tint, low), (tint, high)]);
+    }
+    if let Some(lobe) = &material.specular_glossiness {
+        let (low, high) = (lobe.specular.min_element(), lobe.specular.max_element());
+        shares.extend([("glossiness", lobe.glossiness), ("reflectance", low), ("reflectance", high)]);
+    }
+    shares
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ mod report;
 mod surroundings;
 
 pub use place::{Placed, Renderable};
+pub use pose::Driven;
 use pose::Pose;
 use surroundings::Surroundings;
 

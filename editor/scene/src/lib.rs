@@ -18,13 +18,13 @@ mod transform;
 
 pub use animation::{Animation, Channel, ChannelPath, ClipChoice, Interpolation, Sample};
 pub use assets::{
-    AlphaMode, Camera, DeformPose, Environment, EnvironmentFile, Light, LightKind, Material, Mesh, MeshData,
-    MorphTarget, Primitive, Projection, RadianceMap, Sampler, ShadingMode, SkinData, Texture, TextureUse,
-    Wrap,
+    AlphaMode, Anisotropy, Camera, Clearcoat, DeformPose, DiffuseTransmission, Environment, EnvironmentFile,
+    Iridescence, Light, LightKind, Material, Mesh, MeshData, MorphTarget, Primitive, Projection, RadianceMap,
+    Sampler, ShadingMode, Sheen, SkinData, SpecularGlossiness, Texture, TextureUse, Wrap,
 };
 pub use audit::{Finding, Severity, Subject, audit};
 pub use changes::{ChangeSet, Content};
-pub use document::{Document, Placed, Renderable};
+pub use document::{Document, Driven, Placed, Renderable};
 pub use edit::{Edit, EditError, OverrideField};
 pub use ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
 pub use node::{Node, NodeKind, RayVisibility, Subtree};

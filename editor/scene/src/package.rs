@@ -79,7 +79,7 @@ fn package(id: PrefabId, imported: Imported, ids: &AssetIds) -> PrefabPackage {
         mesh
     });
     let materials = materials.into_iter().map(|mut value| {
-        for texture_use in value.textures_mut() {
+        for texture_use in value.texture_slots_mut().flatten() {
             texture_use.texture = lookup(&ids.textures, texture_use.texture.0).unwrap_or(texture_use.texture);
         }
         MaterialEntry { original: Some(value.clone()), value }

@@ -15,7 +15,7 @@ use crate::dialogs::Dialogs;
 use crate::panels::{self, Cx, bars, overlays};
 use crate::session::Session;
 use crate::theme;
-use crate::ui_state::{Config, Health, PaletteState, Tab, UiState, default_layout};
+use crate::ui_state::{Config, Health, PaletteState, Tab, UiState, add_tab, default_layout};
 use crate::worker::{Answer, Job, Wake};
 
 /// What waits for an answer about unsaved changes.
@@ -329,9 +329,7 @@ impl Editor {
 
     /// Shows a panel: brings its tab to the front, or puts it back.
     pub(super) fn show_tab(&mut self, tab: Tab) {
-        if self.dock.find_tab(&tab).is_none() {
-            self.dock.push_to_first_leaf(tab);
-        }
+        add_tab(&mut self.dock, tab);
         if let Some(path) = self.dock.find_tab(&tab)
             && self.dock.set_active_tab(path).is_err()
         {

@@ -24,6 +24,7 @@ pub(super) struct Metadata {
     pub(super) seconds: f64,
     pub(super) device: String,
     pub(super) pipeline: &'static str,
+    pub(super) sampler: &'static str,
     pub(super) seed: u32,
 }
 
@@ -96,6 +97,7 @@ pub(super) fn write_exr(
     let device = Text::new_or_none(&metadata.device).unwrap_or_else(|| Text::from("unknown"));
     note("caustica.device", AttributeValue::Text(device));
     note("caustica.pipeline", AttributeValue::Text(Text::from(metadata.pipeline)));
+    note("caustica.sampler", AttributeValue::Text(Text::from(metadata.sampler)));
     note("caustica.seed", AttributeValue::Text(Text::from(metadata.seed.to_string().as_str())));
     let layer = Layer::new(size, attributes, ENCODING, channels);
     make_folder(path)?;

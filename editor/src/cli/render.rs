@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use caustica_renderer::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+use caustica_renderer::delta::LightId;
+use caustica_renderer::{NeedsMode, Pipeline, Sampler, Show, ToneMap, ViewSettings};
 use caustica_scene::Edit;
 use clap::{ArgGroup, Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -54,12 +55,19 @@ pub(super) struct RenderArgs {
     /// An environment map (.hdr, .exr), or a constant radiance R,G,B
     #[arg(long, value_name = "FILE|R,G,B")]
     environment: Option<String>,
+    /// Where random numbers come from. A Hammersley set is made for half of --samples, as there are two streams; without
+    /// --samples, for 256
+    #[arg(long, value_enum)]
+    sampler: Option<SamplerArg>,
     /// Seed of all random numbers
     #[arg(long)]
     seed: Option<u32>,
-    /// Reflections and refractions after the first surface
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
+    /// Reflections and refractions after the first surface; bounces in `path`, where the default is no limit
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1024))]
     max_depth: Option<u32>,
+    /// In `path`, reflect the light too that rough surfaces scatter more than once (off: glTF to the letter)
+    #[arg(long)]
+    multiple_scattering: bool,
     /// Shadow rays a light and pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     shadow_rays: Option<u32>,
@@ -75,12 +83,15 @@ pub(super) struct RenderArgs {
     /// Tone map of a PNG
     #[arg(long, value_enum)]
     tone_map: Option<ToneMapArg>,
-    /// What a PNG shows: the image, or an intermediate target such as base_color, normal, depth
-    #[arg(long, value_name = "TARGET", value_parser = parse_show)]
+    /// What a PNG shows: the image, or a step on the way such as base_color, normal, depth
+    #[arg(long, value_name = "VIEW", value_parser = parse_show, long_help = show_help())]
     show: Option<Show>,
     /// Filter the picture: over the frames alone, or over space too. Less noise for a bias that is not known
     #[arg(long, value_enum, conflicts_with_all = ["target_error", "sample_offset"], default_missing_value = "full", num_args = 0..=1)]
     denoise: Option<DenoiseArg>,
+    /// The light of `--show shadow`: its name, or its number from 1; without it the first that shines
+    #[arg(long, value_name = "NAME|N")]
+    show_light: Option<String>,
     /// Print one JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -122,6 +133,20 @@ enum ToneMapArg {
     Neutral,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SamplerArg {
+    /// Owen-scrambled Sobol points
+    Sobol,
+    /// Halton points, scrambled a pixel
+    Halton,
+    /// Hammersley sets: even when complete, like independent numbers before
+    Hammersley,
+    /// Independent numbers (hashed PCG)
+    Independent,
+    /// Sobol points with offsets that make errors of neighbouring pixels cancel
+    BlueNoise,
+}
+
 fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));
@@ -159,12 +184,35 @@ fn parse_output(text: &str) -> Result<PathBuf, String> {
 
 fn parse_show(text: &str) -> Result<Show, String> {
     serde_json::from_value(json!(text)).map_err(|_| {
-        let names: Vec<String> = Show::ALL
-            .iter()
-            .filter_map(|(show, _)| serde_json::to_value(show).ok()?.as_str().map(str::to_owned))
-            .collect();
+        let names: Vec<String> = show_names().map(|(_, name)| name).collect();
         format!("one of {}", names.join(", "))
     })
+}
+
+/// Every view with its name on the command line.
+fn show_names() -> impl Iterator<Item = (Show, String)> {
+    let name = |show| serde_json::to_value(show).ok()?.as_str().map(str::to_owned);
+    Show::ALL.into_iter().filter_map(move |(show, _)| Some((show, name(show)?)))
+}
+
+fn show_help() -> String {
+    let lines: Vec<String> =
+        show_names().map(|(show, name)| format!("  {name:16} {}", show.meaning())).collect();
+    format!("What a PNG shows: the image, or a step on the way:\n{}", lines.join("\n"))
+}
+
+/// The light that `--show-light` names.
+fn light_of(session: &Session, name: &str) -> anyhow::Result<LightId> {
+    let lights = session.light_names();
+    let by_number = || name.parse::<usize>().ok()?.checked_sub(1).and_then(|index| lights.get(index));
+    match lights.iter().find(|(_, light)| light == name).or_else(by_number) {
+        Some((id, _)) => Ok(*id),
+        None if lights.is_empty() => bail!("--show-light '{name}': the scene has no light"),
+        None => {
+            let known: Vec<&str> = lights.iter().map(|(_, light)| light.as_str()).collect();
+            bail!("--show-light '{name}': no such light; there is: {}", known.join(", "))
+        }
+    }
 }
 
 /// Renders the file.
@@ -201,7 +249,10 @@ pub(super) fn run(
         }
         session.set_camera(ViewCamera::of_document(session.document(), Some(name), 1.0));
     }
-    session.set_settings(settings_of(args, session.settings().clone()));
+    let show_light = args.show_light.as_deref().map(|name| light_of(&session, name)).transpose()?;
+    let settings = settings_of(args, session.settings().clone());
+    session.set_settings(ViewSettings { show_light, ..settings });
+    session.set_sample_target(sample_limit(args))?;
     if args.sample_offset > 0 {
         session.set_sample_offset(args.sample_offset)?;
     }
@@ -214,6 +265,7 @@ pub(super) fn run(
         seconds: run.seconds,
         device: format!("{}, {}", device.name(), device.driver()),
         pipeline: session.settings().pipeline.name(),
+        sampler: session.settings().sampler.name(),
         seed: session.settings().seed,
     };
     // What a scene leaves out cannot be denoised: it was accumulated as ever.
@@ -280,9 +332,17 @@ fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
         }),
         show: args.show.unwrap_or_default(),
         exposure_ev: args.exposure.unwrap_or(of_project.exposure_ev),
+        sampler: args.sampler.map_or(of_project.sampler, |sampler| match sampler {
+            SamplerArg::Sobol => Sampler::Sobol,
+            SamplerArg::Halton => Sampler::Halton,
+            SamplerArg::Hammersley => Sampler::Hammersley,
+            SamplerArg::Independent => Sampler::Independent,
+            SamplerArg::BlueNoise => Sampler::BlueNoise,
+        }),
         seed: args.seed.unwrap_or(of_project.seed),
         max_depth: args.max_depth.unwrap_or(of_project.max_depth),
         path_depth: args.max_depth.or(of_project.path_depth),
+        multiple_scattering: args.multiple_scattering || of_project.multiple_scattering,
         shadow_rays: args.shadow_rays.unwrap_or(of_project.shadow_rays),
         temporal: args.denoises(),
         spatial: args.denoise == Some(DenoiseArg::Full),
@@ -301,12 +361,14 @@ struct Run {
     frames: Vec<Vec<(String, f64)>>,
 }
 
+/// Samples to take; `None`: until a time or a noise is reached.
+fn sample_limit(args: &RenderArgs) -> Option<u64> {
+    let other_end = args.time.is_some() || args.target_error.is_some();
+    args.samples.or((!other_end).then_some(DEFAULT_SAMPLES))
+}
+
 fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) -> anyhow::Result<Run> {
-    let samples = args.samples.unwrap_or(if args.time.is_some() || args.target_error.is_some() {
-        u64::MAX
-    } else {
-        DEFAULT_SAMPLES
-    });
+    let samples = sample_limit(args).unwrap_or(u64::MAX);
     let limit =
         args.time.map(|seconds| Duration::try_from_secs_f64(seconds).context("--time")).transpose()?;
     progress.set_length(if samples == u64::MAX { 0 } else { samples });
@@ -374,6 +436,7 @@ fn summary(
         "output": args.output,
         "size": args.size,
         "pipeline": metadata.pipeline,
+        "sampler": metadata.sampler,
         "device": metadata.device,
         "device_profile": profile.map_or_else(|| String::from("default"), |file| file.display().to_string()),
         "at": args.at,

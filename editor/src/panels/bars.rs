@@ -1,6 +1,6 @@
 //! Menu bar, tool bar and status bar. Enters: session and memory. Leaves: actions and settings of the view.
 
-use caustica_renderer::TlasWork;
+use caustica_renderer::{Show, TlasWork};
 use caustica_scene::PrefabId;
 use egui::{Button, MenuBar, RichText, Ui};
 use egui_phosphor::regular as icon;
@@ -184,7 +184,11 @@ fn render_menu(cx: &mut Cx<'_>, ui: &mut Ui, commands: &[Command]) {
             (false, "") => icon::DOT_OUTLINE,
             (false, icon) => icon,
         };
-        if ui.button(format!("{mark}  {}", command.name)).clicked() {
+        let mut button = ui.button(format!("{mark}  {}", command.name));
+        if let Action::Show(show) = command.action {
+            button = button.on_hover_text(show.meaning());
+        }
+        if button.clicked() {
             cx.act(command.action.clone());
             ui.close();
         }
@@ -210,6 +214,9 @@ pub fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         render::pipeline_menu(ui, &mut settings.pipeline);
         ui.label(RichText::new("Show").weak());
         render::show_menu(ui, &mut settings.show);
+        if settings.show == Show::Shadow {
+            render::light_menu(cx.session, ui, &mut settings.show_light);
+        }
         if settings != *cx.session.settings() {
             cx.session.set_settings(settings);
         }
@@ -295,8 +302,8 @@ pub fn status(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.spacing_mut().item_spacing.x = 12.0;
-            let ms: f64 = statistics.passes.iter().map(|(_, ms)| ms).sum();
-            ui.label(mono(format!("{ms:7.2} ms"))).on_hover_text("All passes of a frame on the device");
+            let ms = super::milliseconds(cx.session.device_ms(), 2);
+            ui.label(mono(format!("{ms:>7} ms"))).on_hover_text("All passes of a frame on the device");
             ui.label(mono(format!("{:6} samples", statistics.samples))).on_hover_text("Samples in each pixel of the picture");
             if let Some(audit) = &cx.state.health {
                 let problems = audit.findings.iter().filter(|f| f.severity != caustica_scene::Severity::Info).count();

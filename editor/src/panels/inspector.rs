@@ -2,13 +2,13 @@
 //! field is one step of the history because its edits join.
 
 use caustica_scene::{
-    Camera, Edit, Light, LightKind, Local, NodeKind, OverrideField, Projection, Target, Trs,
+    Camera, Driven, Edit, Light, LightKind, Local, NodeKind, OverrideField, Projection, Target, Trs,
 };
 use egui::{DragValue, RichText, TextEdit, Ui};
 use egui_phosphor::regular as icon;
 use glam::DVec3;
 
-use super::{Cx, field, light_icon, section, target_icon};
+use super::{Cx, field, light_icon, number, section, target_icon};
 use crate::gizmo::paint::axis_color;
 use crate::ui_state::EulerFields;
 
@@ -76,10 +76,11 @@ fn name_field(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
 }
 
 fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
-    let Some(local) = cx.session.document().local(target) else { return };
+    let document = cx.session.document();
+    let (Some(local), driven) = (document.local(target), document.driven(target)) else { return };
     let inspector = &mut cx.state.inspector;
     let (euler, uniform) = (&mut inspector.euler, inspector.uniform_scale);
-    let changed = trs_fields(ui, "parent", euler, target, local.nearest_trs(), uniform);
+    let changed = trs_fields(ui, "parent", euler, target, local.nearest_trs(), uniform, driven);
     ui.checkbox(&mut cx.state.inspector.uniform_scale, "Scale all axes together");
     if matches!(local, Local::Matrix(_)) {
         ui.colored_label(
@@ -87,18 +88,12 @@ fn transform(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
             "This transform has shear; changing a field removes it.",
         );
     }
-    if cx.session.document().posed_local(target) != Some(local) {
-        ui.colored_label(
-            ui.visuals().warn_fg_color,
-            "A clip moves this at the time that is shown; the fields are those of the rest pose.",
-        );
-    }
     if let Some(trs) = changed {
         cx.push(Edit::SetTransform { target, local: Local::Trs(trs) });
     }
 }
 
-/// Position, rotation and scale against `parent`; gives them when one was changed.
+/// Position, rotation and scale against `parent`; gives them when one was changed. `driven`: what a clip sets.
 pub(super) fn trs_fields(
     ui: &mut Ui,
     parent: &str,
@@ -106,24 +101,52 @@ pub(super) fn trs_fields(
     target: Target,
     trs: Trs,
     uniform_scale: bool,
+    driven: Driven,
 ) -> Option<Trs> {
     let mut changed = None;
-    let speed = (trs.translation.abs().max_element() * 0.002).clamp(0.002, 1.0);
-    let tip = format!("Metres against the {parent}");
-    let moved = vector_field(ui, "Position", &tip, trs.translation, speed, " m", DVec3::ZERO);
-    if let Some(translation) = moved {
+    let position = VectorField {
+        name: "Position",
+        tip: &format!("Metres against the {parent}"),
+        speed: (trs.translation.abs().max_element() * 0.002).clamp(0.002, 1.0),
+        decimals: 3,
+        suffix: " m",
+        neutral: DVec3::ZERO,
+        driven: driven.translation,
+    };
+    if let Some(translation) = position.ui(ui, trs.translation) {
         changed = Some(Trs { translation, ..trs });
     }
-    let shown = euler.degrees(target, trs.rotation);
-    let tip = format!("Degrees about X, then Y, then Z (fixed axes of the {parent})");
-    if let Some(degrees) = vector_field(ui, "Rotation", &tip, shown, 0.5, "\u{b0}", DVec3::ZERO) {
+    let rotation = VectorField {
+        name: "Rotation",
+        tip: &format!("Degrees about X, then Y, then Z (fixed axes of the {parent})"),
+        speed: 0.5,
+        decimals: 1,
+        suffix: "\u{b0}",
+        neutral: DVec3::ZERO,
+        driven: driven.rotation,
+    };
+    if let Some(degrees) = rotation.ui(ui, euler.degrees(target, trs.rotation)) {
         changed = Some(Trs { rotation: euler.set(target, degrees), ..trs });
     }
-    let tip = "Along its own axes; negative mirrors";
-    if let Some(scale) = vector_field(ui, "Scale", tip, trs.scale, 0.01, "", DVec3::ONE) {
+    let scale = VectorField {
+        name: "Scale",
+        tip: "Along its own axes; negative mirrors",
+        speed: scale_speed(trs.scale),
+        decimals: 2,
+        suffix: "",
+        neutral: DVec3::ONE,
+        driven: driven.scale,
+    };
+    if let Some(scale) = scale.ui(ui, trs.scale) {
         changed = Some(Trs { scale: if uniform_scale { uniform(trs.scale, scale) } else { scale }, ..trs });
     }
     changed
+}
+
+/// A point of a drag is a hundredth of what is dragged, whatever its size.
+fn scale_speed(scale: DVec3) -> f64 {
+    let size = scale.abs().max_element();
+    if size > 0.0 { size * 0.01 } else { 0.01 }
 }
 
 /// Scales all axes by the factor by which one was changed.
@@ -136,43 +159,62 @@ fn uniform(old: DVec3, new: DVec3) -> DVec3 {
     }
 }
 
-fn vector_field(
-    ui: &mut Ui,
-    name: &str,
-    tip: &str,
-    value: DVec3,
+/// Three numbers in a row below their name.
+struct VectorField<'a> {
+    name: &'a str,
+    tip: &'a str,
+    /// Of a drag, a point.
     speed: f64,
-    suffix: &str,
-    rest: DVec3,
-) -> Option<DVec3> {
-    let mut edited = value;
-    let mut changed = false;
-    ui.horizontal(|ui| {
-        ui.label(RichText::new(name).weak()).on_hover_text(tip);
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let reset = egui::Button::new(icon::ARROW_COUNTER_CLOCKWISE).frame(false);
-            if ui.add_enabled(value != rest, reset).on_hover_text("Back to the neutral value").clicked() {
-                edited = rest;
-                changed = true;
+    decimals: usize,
+    suffix: &'a str,
+    neutral: DVec3,
+    /// A clip sets it: what is typed shows at rest only.
+    driven: bool,
+}
+
+impl VectorField<'_> {
+    /// Gives the numbers when one was changed.
+    fn ui(&self, ui: &mut Ui, value: DVec3) -> Option<DVec3> {
+        let mut edited = value;
+        let mut changed = false;
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(self.name).weak()).on_hover_text(self.tip);
+            if self.driven {
+                rest_pose_mark(ui);
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let reset = egui::Button::new(icon::ARROW_COUNTER_CLOCKWISE).frame(false);
+                let reset = ui.add_enabled(value != self.neutral, reset);
+                if reset.on_hover_text("Back to the neutral value").clicked() {
+                    edited = self.neutral;
+                    changed = true;
+                }
+            });
+        });
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let width = ((ui.available_width() - 8.0) / 3.0).max(48.0);
+            for axis in 0..3 {
+                let letter = RichText::new(["X ", "Y ", "Z "][axis]).color(axis_color(axis)).small().strong();
+                let drag = number::field(&mut edited[axis], self.decimals)
+                    .speed(self.speed)
+                    .prefix(letter)
+                    .suffix(self.suffix)
+                    .update_while_editing(false);
+                changed |= ui.add_sized([width, ui.spacing().interact_size.y], drag).changed();
             }
         });
-    });
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        let width = ((ui.available_width() - 8.0) / 3.0).max(48.0);
-        for axis in 0..3 {
-            let letter = RichText::new(["X ", "Y ", "Z "][axis]).color(axis_color(axis)).small().strong();
-            let drag = DragValue::new(&mut edited[axis])
-                .speed(speed)
-                .max_decimals(4)
-                .prefix(letter)
-                .suffix(suffix)
-                .update_while_editing(false);
-            changed |= ui.add_sized([width, ui.spacing().interact_size.y], drag).changed();
-        }
-    });
-    ui.add_space(2.0);
-    (changed && edited.is_finite()).then_some(edited)
+        ui.add_space(2.0);
+        (changed && edited.is_finite()).then_some(edited)
+    }
+}
+
+/// Says of a value that a clip sets it: what is edited is that of the rest pose.
+pub(super) fn rest_pose_mark(ui: &mut Ui) {
+    let text = RichText::new(format!("{}  rest pose", icon::FILM_STRIP)).small();
+    ui.colored_label(ui.visuals().warn_fg_color, text).on_hover_text(
+        "A clip sets this at the time that is shown. What is changed here is the rest pose: Shift+Space shows it.",
+    );
 }
 
 fn light_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Light) {

@@ -5,6 +5,7 @@ use caustica_scene::{AlphaMode, Edit, Material, MaterialEntry, MaterialId, Shadi
 use egui::{DragValue, RichText, Slider, Ui};
 use egui_phosphor::regular as icon;
 
+use super::material_lobes::{dispersion_field, glossiness_fields, lobe_fields};
 use super::{Cx, field, section};
 
 /// Indices of refraction for sodium light (589 nm), as tabulated in common handbooks.
@@ -68,6 +69,7 @@ fn edit_material(cx: &mut Cx<'_>, ui: &mut Ui, id: MaterialId, old: &Material) {
         ShadingMode::Refractive => {
             ior_field(ui, &mut new.ior);
             volume_fields(ui, &mut new);
+            dispersion_field(ui, &mut new.dispersion);
         }
         ShadingMode::Reflective | ShadingMode::Unlit => {}
     }
@@ -107,6 +109,25 @@ fn mode_buttons(ui: &mut Ui, material: &mut Material) {
 }
 
 fn pbr_fields(cx: &Cx<'_>, ui: &mut Ui, material: &mut Material) {
+    match &mut material.specular_glossiness {
+        Some(lobe) => glossiness_fields(cx, ui, lobe),
+        None => metallic_roughness_fields(cx, ui, material),
+    }
+    field(ui, "Transmission", "Share of the light that passes instead of being scattered", |ui| {
+        share_slider(ui, &mut material.transmission);
+        texture_note(cx, ui, material.transmission_texture);
+    });
+    let scatters_inside = material.diffuse_transmission.is_some();
+    if material.transmission > 0.0 || scatters_inside {
+        volume_fields(ui, material);
+    }
+    if material.transmission > 0.0 && material.has_volume {
+        dispersion_field(ui, &mut material.dispersion);
+    }
+    lobe_fields(cx, ui, material);
+}
+
+fn metallic_roughness_fields(cx: &Cx<'_>, ui: &mut Ui, material: &mut Material) {
     field(ui, "Metallic", "0: plastic, stone, wood. 1: metal", |ui| {
         share_slider(ui, &mut material.metallic);
         texture_note(cx, ui, material.metallic_roughness_texture);
@@ -117,18 +138,13 @@ fn pbr_fields(cx: &Cx<'_>, ui: &mut Ui, material: &mut Material) {
     });
     field(ui, "Specular", "Strength of the reflection of what is not metal", |ui| {
         share_slider(ui, &mut material.specular);
+        texture_note(cx, ui, material.specular_texture);
     });
     ior_field(ui, &mut material.ior);
-    field(ui, "Transmission", "Share of the light that passes instead of being scattered", |ui| {
-        share_slider(ui, &mut material.transmission);
-    });
-    if material.transmission > 0.0 {
-        volume_fields(ui, material);
-    }
 }
 
 /// A slider from 0 to 1 that leaves room for its figure and an icon.
-fn share_slider(ui: &mut Ui, value: &mut f32) {
+pub(super) fn share_slider(ui: &mut Ui, value: &mut f32) {
     ui.spacing_mut().slider_width = (ui.available_width() - 96.0).clamp(32.0, 160.0);
     let mut shown = *value;
     if ui
@@ -237,7 +253,7 @@ fn alpha_field(ui: &mut Ui, material: &mut Material) {
     });
 }
 
-fn texture_note(cx: &Cx<'_>, ui: &mut Ui, used: Option<TextureUse>) {
+pub(super) fn texture_note(cx: &Cx<'_>, ui: &mut Ui, used: Option<TextureUse>) {
     let Some(used) = used else { return };
     let Some(texture) = cx.session.document().texture(used.texture) else { return };
     let name = if texture.name.is_empty() { "unnamed image" } else { &texture.name };

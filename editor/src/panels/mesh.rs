@@ -1,12 +1,12 @@
 //! What is particular to a placed mesh: which rays meet it, the weights of its morph targets, its primitives. Enters: the
 //! document. Leaves: edits; a drag of a slider is one step of the history because its edits join.
 
-use caustica_scene::{Document, Edit, Local, OverrideField, Target};
+use caustica_scene::{Document, Driven, Edit, Local, OverrideField, Target};
 use egui::{Button, RichText, ScrollArea, Slider, Ui};
 use egui_phosphor::regular as icon;
 use glam::DAffine3;
 
-use super::inspector::trs_fields;
+use super::inspector::{rest_pose_mark, trs_fields};
 use super::{Cx, field, section};
 use crate::ui_state::SelectedPrimitive;
 
@@ -64,17 +64,14 @@ fn shape(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Vec<f32>) {
         };
         mesh.data.morph.iter().map(|morph| &morph.name).enumerate().map(name).collect()
     });
-    let shown = document.deform_pose(target).map(|pose| pose.weights);
+    let driven = document.driven(target).weights;
     let own = document.part_override(target).is_some_and(|own| own.weights.is_some());
     let mut new = old.clone();
     for (index, (name, weight)) in names.iter().zip(&mut new).enumerate() {
         ui.push_id(index, |ui| field(ui, name, name, |ui| weight_slider(ui, weight)));
     }
-    if shown.is_some_and(|shown| shown != old) {
-        ui.colored_label(
-            ui.visuals().warn_fg_color,
-            "A clip sets these at the time that is shown; the sliders are those of the rest pose.",
-        );
+    if driven {
+        rest_pose_mark(ui);
     }
     let mut reset = false;
     ui.horizontal(|ui| {
@@ -157,7 +154,9 @@ fn place(cx: &mut Cx<'_>, ui: &mut Ui, selected: SelectedPrimitive) {
     let inspector = &mut cx.state.inspector;
     let (euler, uniform) = (&mut inspector.primitive_euler, inspector.uniform_scale);
     let trs = Local::from_affine(mesh_from_primitive).nearest_trs();
-    let changed = ui.push_id("primitive", |ui| trs_fields(ui, "mesh", euler, target, trs, uniform)).inner;
+    let changed = ui
+        .push_id("primitive", |ui| trs_fields(ui, "mesh", euler, target, trs, uniform, Driven::default()))
+        .inner;
     let mut new = changed.map(|trs| Local::Trs(trs).to_affine());
     let moved = mesh_from_primitive != DAffine3::IDENTITY;
     let button = Button::new(format!("{}  Back to its place in the file", icon::ARROW_COUNTER_CLOCKWISE));

@@ -1,16 +1,18 @@
 //! Settings of the picture: environment, pipeline, exposure, sampling. Enters and leaves: the view's settings.
 
-use caustica_renderer::{NeedsMode, Pipeline, Show, ToneMap, ViewSettings};
+use caustica_renderer::delta::LightId;
+use caustica_renderer::{NeedsMode, Pipeline, Sampler, Sampling, Show, ToneMap, ViewSettings};
 use egui::{DragValue, Slider, Ui};
 
 use super::{Cx, field, section};
+use crate::session::Session;
 
 /// Draws the panel.
 pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
     section(ui, "Environment", |ui| super::environment::ui(cx, ui));
     let old = cx.session.settings().clone();
     let mut new = old.clone();
-    section(ui, "Picture", |ui| picture(ui, &mut new));
+    section(ui, "Picture", |ui| picture(cx.session, ui, &mut new));
     section(ui, "Sampling", |ui| sampling(ui, &mut new));
     section(ui, "While moving", |ui| moving(cx, ui, &mut new));
     if new != old {
@@ -34,11 +36,34 @@ pub fn pipeline_menu(ui: &mut Ui, pipeline: &mut Pipeline) {
 /// A menu of what is shown.
 pub fn show_menu(ui: &mut Ui, show: &mut Show) {
     let name = Show::ALL.iter().find(|(choice, _)| choice == show).map_or("", |(_, name)| name);
-    egui::ComboBox::from_id_salt("show").selected_text(name).width(128.0).height(420.0).show_ui(ui, |ui| {
-        for (choice, name) in Show::ALL {
-            ui.selectable_value(show, choice, name);
-        }
-    });
+    egui::ComboBox::from_id_salt("show")
+        .selected_text(name)
+        .width(128.0)
+        .height(420.0)
+        .show_ui(ui, |ui| {
+            for (choice, name) in Show::ALL {
+                ui.selectable_value(show, choice, name).on_hover_text(choice.meaning());
+            }
+        })
+        .response
+        .on_hover_text(show.meaning());
+}
+
+/// A menu of the lights whose shadow can be shown; `None` is the first that shines.
+pub fn light_menu(session: &Session, ui: &mut Ui, light: &mut Option<LightId>) {
+    let lights = session.light_names();
+    let chosen = lights.iter().find(|(id, _)| light.is_none_or(|light| light == *id));
+    let name = chosen.map_or("no light", |(_, name)| name);
+    egui::ComboBox::from_id_salt("shadow of")
+        .selected_text(name)
+        .width(104.0)
+        .show_ui(ui, |ui| {
+            for (id, name) in &lights {
+                ui.selectable_value(light, Some(*id), name);
+            }
+        })
+        .response
+        .on_hover_text("The light whose shadow is shown");
 }
 
 fn pipeline_name(pipeline: Pipeline) -> String {
@@ -59,9 +84,14 @@ fn pipeline_tip(pipeline: Pipeline) -> &'static str {
     }
 }
 
-fn picture(ui: &mut Ui, settings: &mut ViewSettings) {
+fn picture(session: &Session, ui: &mut Ui, settings: &mut ViewSettings) {
     field(ui, "Pipeline", "How the picture is made", |ui| pipeline_menu(ui, &mut settings.pipeline));
     field(ui, "Show", "The finished picture or a step on the way", |ui| show_menu(ui, &mut settings.show));
+    if settings.show == Show::Shadow {
+        field(ui, "Light", "The light whose shadow is shown", |ui| {
+            light_menu(session, ui, &mut settings.show_light);
+        });
+    }
     field(ui, "Exposure", "Stops: each doubles the light. The picture is not rendered anew", |ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - 96.0).clamp(32.0, 160.0);
         ui.add(
@@ -92,7 +122,48 @@ fn tone_name(tone_map: ToneMap) -> &'static str {
     }
 }
 
+fn sampler_name(sampler: Sampler) -> &'static str {
+    match sampler {
+        Sampler::Sobol => "Sobol",
+        Sampler::Halton => "Halton",
+        Sampler::Hammersley => "Hammersley",
+        Sampler::Independent => "Independent",
+        Sampler::BlueNoise => "Blue noise",
+    }
+}
+
+fn sampler_tip(sampler: Sampler) -> String {
+    match sampler {
+        Sampler::Sobol => {
+            String::from("Even at every number of samples that is a power of two, and nearly so between")
+        }
+        Sampler::Halton => {
+            String::from("Even at any number of samples; large bases need many, so Sobol is mostly better")
+        }
+        Sampler::Hammersley => format!(
+            "Even once a set is complete, noisy before. Here, where nobody knows how many samples there will be, a set \
+             has {} of them; caustica render makes it for --samples",
+            2 * Sampling::UNKNOWN_SET
+        ),
+        Sampler::Independent => {
+            String::from("Independent numbers: the noise that the others are measured by")
+        }
+        Sampler::BlueNoise => String::from(
+            "Sobol whose errors cancel between neighbouring pixels: fine grain at the first samples",
+        ),
+    }
+}
+
 fn sampling(ui: &mut Ui, settings: &mut ViewSettings) {
+    field(ui, "Sampler", "Where random numbers come from. Each leads to the same picture", |ui| {
+        let name = sampler_name(settings.sampler);
+        egui::ComboBox::from_id_salt("sampler").selected_text(name).show_ui(ui, |ui| {
+            for choice in Sampler::ALL {
+                ui.selectable_value(&mut settings.sampler, choice, sampler_name(choice))
+                    .on_hover_text(sampler_tip(choice));
+            }
+        });
+    });
     field(ui, "Lights a pixel", "All lights when there are at most this many, else a random choice", |ui| {
         ui.add(DragValue::new(&mut settings.light_samples).range(1..=64).speed(0.1));
     });
@@ -133,6 +204,14 @@ fn path_depth(ui: &mut Ui, settings: &mut ViewSettings) {
             if let Some(depth) = &mut settings.path_depth {
                 ui.add(DragValue::new(depth).range(0..=1024).speed(0.1));
             }
+        },
+    );
+    field(
+        ui,
+        "Rough metal",
+        "In the path tracer, reflect the light too that rough surfaces scatter more than once; off is glTF to the letter",
+        |ui| {
+            ui.checkbox(&mut settings.multiple_scattering, "scatters repeatedly");
         },
     );
 }

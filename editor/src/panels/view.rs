@@ -1,8 +1,9 @@
 //! The picture with what lies over it: gizmo, marks of lights and cameras, axis cross, figures. Enters: the session's
 //! image, the camera. Leaves: clicks as selections, drags as edits and camera moves.
 
-use caustica_scene::Target;
+use caustica_scene::{Document, Driven, Target};
 use egui::{Align2, Color32, CornerRadius, FontId, Pos2, Rect, Response, Sense, Stroke, Ui, Vec2, vec2};
+use egui_phosphor::regular as icon;
 use glam::{DVec2, DVec3};
 
 use super::{Cx, view_input};
@@ -12,7 +13,7 @@ use crate::gizmo::paint::{GizmoPicture, axis_color, describe};
 use crate::gizmo::{Frame, Handle, Space, Tool};
 use crate::projection::ViewProjection;
 use crate::ui_renderer::VIEW_TEXTURE;
-use crate::ui_state::ViewState;
+use crate::ui_state::{Selection, ViewState};
 
 /// Most marks of lights and cameras that are drawn.
 const MOST_MARKS: usize = 256;
@@ -42,7 +43,7 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         None => view_input::click(cx, ui, &response, mark),
     }
     figures(cx, ui, rect);
-    primitive_note(cx, ui, rect);
+    note(cx, ui, rect);
     response.context_menu(|ui| context_menu(cx, ui));
 }
 
@@ -238,8 +239,8 @@ fn figures(cx: &Cx<'_>, ui: &Ui, rect: Rect) {
     let Some([width, height]) = cx.state.view.extent_px else { return };
     let view: &ViewState = &cx.state.view;
     let statistics = cx.session.statistics();
-    let ms: f64 = statistics.passes.iter().map(|(_, ms)| ms).sum();
-    let mut text = format!("{} samples | {ms:.1} ms | {width}x{height}", statistics.samples);
+    let ms = super::milliseconds(cx.session.device_ms(), 1);
+    let mut text = format!("{} samples | {ms} ms | {width}x{height}", statistics.samples);
     if view.divisor > 1 {
         text += &format!(" at 1/{}", view.divisor);
     }
@@ -254,13 +255,43 @@ fn figures(cx: &Cx<'_>, ui: &Ui, rect: Rect) {
     }
 }
 
-/// Says what the gizmo moves when that is no object.
-fn primitive_note(cx: &Cx<'_>, ui: &Ui, rect: Rect) {
+/// Says what the gizmo moves when that is not what is seen: a primitive, or a pose that a clip hides.
+fn note(cx: &Cx<'_>, ui: &Ui, rect: Rect) {
     let document = cx.session.document();
-    let Some(selected) = cx.state.selection.primitive(document) else { return };
-    let text =
-        format!("{}: moves wherever the mesh is placed", super::mesh::primitive_name(document, &selected));
-    caption(&ui.painter_at(rect), rect.center_top() + vec2(0.0, 10.0), Align2::CENTER_TOP, &text);
+    let text = match cx.state.selection.primitive(document) {
+        Some(selected) => {
+            let name = super::mesh::primitive_name(document, &selected);
+            Some(format!("{name}: moves wherever the mesh is placed"))
+        }
+        None => clip_note(document, &cx.state.selection, cx.state.tool),
+    };
+    if let Some(text) = text {
+        caption(&ui.painter_at(rect), rect.center_top() + vec2(0.0, 10.0), Align2::CENTER_TOP, &text);
+    }
+}
+
+/// Warns that a clip hides what the handles do; `None`: they are seen to do it.
+fn clip_note(document: &Document, selection: &Selection, tool: Tool) -> Option<String> {
+    let tops = selection.tops(document);
+    let hidden: Vec<Target> =
+        tops.iter().copied().filter(|target| hides(document.driven(*target), tool)).collect();
+    let who = match hidden.as_slice() {
+        [] => return None,
+        [one] => document.display_name(*one),
+        more => format!("{} objects", more.len()),
+    };
+    let warning = icon::WARNING;
+    Some(format!("{warning} a clip moves {who}: the handles change the rest pose (Shift+Space shows it)"))
+}
+
+/// Whether what a tool does is hidden by a clip that sets the same.
+fn hides(driven: Driven, tool: Tool) -> bool {
+    match tool {
+        Tool::Select => false,
+        Tool::Move => driven.translation,
+        Tool::Rotate => driven.rotation,
+        Tool::Scale => driven.scale,
+    }
 }
 
 fn caption(painter: &egui::Painter, at: Pos2, align: Align2, text: &str) {

@@ -14,7 +14,7 @@ use crate::sync::{camera_of, instance_id};
 const CONVERGED_SAMPLES: u64 = 4096;
 
 impl Session {
-    /// Syncs the document and records one frame of the view, `extent_px` large.
+    /// Syncs the document and records one frame of the view, `extent_px` large at full resolution.
     ///
     /// # Errors
     /// When a shader does not compile or fit, memory runs out, or the device is lost.
@@ -147,6 +147,11 @@ impl Session {
         self.renderer.statistics(self.view).unwrap_or(&NOTHING)
     }
 
+    /// Milliseconds of all passes of the newest frame that has finished; `None` before the first one.
+    pub fn device_ms(&self) -> Option<f64> {
+        total_ms(&self.statistics().passes)
+    }
+
     /// What all frames did together.
     pub fn tally(&self) -> &Tally {
         &self.tally
@@ -177,6 +182,11 @@ impl Session {
     }
 }
 
+/// A sum of nothing is no time, and in Rust it is -0.
+fn total_ms(passes: &[(String, f64)]) -> Option<f64> {
+    passes.iter().map(|(_, ms)| *ms).reduce(|a, b| a + b)
+}
+
 /// Instances of the selected targets and of everything below them.
 fn outlined(document: &Document, selection: &BTreeSet<Target>) -> Vec<caustica_renderer::delta::InstanceId> {
     let mut waiting: Vec<Target> = selection.iter().copied().collect();
@@ -188,4 +198,16 @@ fn outlined(document: &Document, selection: &BTreeSet<Target>) -> Vec<caustica_r
         waiting.extend(document.children_of(target));
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn before_the_first_frame_there_is_no_time() {
+        assert_eq!(total_ms(&[]), None);
+        let passes = [("gbuffer", 0.25), ("shadow", 0.5)].map(|(label, ms)| (label.to_owned(), ms));
+        assert_eq!(total_ms(&passes), Some(0.75));
+    }
 }

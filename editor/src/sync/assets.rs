@@ -7,8 +7,9 @@ use std::sync::Arc;
 use caustica_renderer::delta::{self, SceneDelta};
 use caustica_scene::{ChangeSet, Document, MaterialId, MeshId, Target, TextureId};
 
-use super::convert::{material_of, mesh_of, render_from, texture_of};
+use super::convert::{mesh_of, render_from, texture_of};
 use super::deform::Shape;
+use super::material::material_of;
 
 /// Assets that one instance uses.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,8 +125,8 @@ impl Assets {
             let Some(material) = document.material(id) else { continue };
             let Some((_, old)) = self.materials.get_mut(&id) else { continue };
             // A texture that its prefab has taken along is shown as none.
-            let textures_used = material.textures().map(|used| used.texture);
-            let used: Vec<TextureId> = textures_used.filter(|id| document.texture(*id).is_some()).collect();
+            let sent = material_of(material, |texture| document.texture(texture).is_some());
+            let used: Vec<TextureId> = sent.textures().map(|used| TextureId(used.texture.0)).collect();
             let old = std::mem::replace(old, used.clone());
             for texture in &used {
                 let count = self.textures.entry(*texture).or_insert(0);
@@ -135,8 +136,7 @@ impl Assets {
                 }
             }
             self.release_textures(&old);
-            let is_there = |texture: TextureId| document.texture(texture).is_some();
-            delta.materials.push((delta::MaterialId(id.0), material_of(material, is_there)));
+            delta.materials.push((delta::MaterialId(id.0), sent));
         }
         for id in textures.into_iter().filter(|id| self.textures.get(id).is_some_and(|count| *count > 0)) {
             if let Some(texture) = document.texture(id) {

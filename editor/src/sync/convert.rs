@@ -97,55 +97,6 @@ pub fn texture_of(texture: &scene::Texture) -> delta::Texture {
     }
 }
 
-/// A material. Textures that are gone are left out.
-pub fn material_of(
-    material: &scene::Material,
-    is_there: impl Fn(scene::TextureId) -> bool,
-) -> delta::Material {
-    let texture = |used: &Option<scene::TextureUse>| {
-        used.filter(|used| is_there(used.texture)).map(|used| delta::TextureUse {
-            texture: delta::TextureId(used.texture.0),
-            tex_coord: used.tex_coord,
-            offset: used.offset,
-            rotation_rad: used.rotation_rad,
-            scale: used.scale,
-        })
-    };
-    delta::Material {
-        mode: match material.mode {
-            scene::ShadingMode::Pbr => delta::ShadingMode::Pbr,
-            scene::ShadingMode::Reflective => delta::ShadingMode::Reflective,
-            scene::ShadingMode::Refractive => delta::ShadingMode::Refractive,
-            scene::ShadingMode::Unlit => delta::ShadingMode::Unlit,
-        },
-        base_color: material.base_color,
-        base_color_texture: texture(&material.base_color_texture),
-        metallic: material.metallic,
-        roughness: material.roughness,
-        metallic_roughness_texture: texture(&material.metallic_roughness_texture),
-        normal_texture: texture(&material.normal_texture),
-        normal_scale: material.normal_scale,
-        occlusion_texture: texture(&material.occlusion_texture),
-        occlusion_strength: material.occlusion_strength,
-        emissive: material.emitted_radiance(),
-        emissive_texture: texture(&material.emissive_texture),
-        ior: material.ior,
-        specular: material.specular,
-        specular_color: material.specular_color,
-        transmission: material.transmission,
-        has_volume: material.has_volume,
-        volume_priority: material.volume_priority,
-        attenuation_color: material.attenuation_color,
-        attenuation_distance_m: material.attenuation_distance_m.unwrap_or(f32::INFINITY),
-        alpha: match material.alpha {
-            scene::AlphaMode::Opaque => delta::AlphaMode::Opaque,
-            scene::AlphaMode::Mask { cutoff } => delta::AlphaMode::Mask { cutoff },
-            scene::AlphaMode::Blend => delta::AlphaMode::Blend,
-        },
-        double_sided: material.double_sided,
-    }
-}
-
 /// A light at its place; it shines along its node's -Z. The node's scale does not act on its size.
 pub fn light_of(light: &Placed<scene::Light>, origin: DVec3) -> delta::Light {
     let place = scene::rigid(&light.world_from_node);

@@ -78,6 +78,24 @@ pub fn default_layout() -> DockState<Tab> {
     dock
 }
 
+/// Puts a panel that is not there beside one that it stands with by default, else below everything. What is in front stays
+/// there.
+pub fn add_tab(dock: &mut DockState<Tab>, tab: Tab) {
+    if dock.find_tab(&tab).is_some() {
+        return;
+    }
+    let default = default_layout();
+    let beside = |other: &Tab| {
+        default.iter_leaves().any(|(_, leaf)| leaf.tabs.contains(&tab) && leaf.tabs.contains(other))
+    };
+    let leaf = dock.iter_leaves().find(|(_, leaf)| leaf.tabs.iter().any(beside)).map(|(path, _)| path);
+    if let Some(Ok(leaf)) = leaf.map(|path| dock.leaf_mut(path)) {
+        leaf.tabs.push(tab);
+    } else {
+        dock.main_surface_mut().split_below(NodeIndex::root(), 0.76, vec![tab]);
+    }
+}
+
 /// What is kept between runs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(default)]
@@ -94,6 +112,9 @@ pub struct Config {
     pub adaptive: bool,
     /// Where the panels are.
     pub layout: Option<DockState<Tab>>,
+    /// The panels that the version which wrote the file had: of those the missing ones were closed.
+    #[serde(default)]
+    pub known_tabs: Vec<Tab>,
 }
 
 impl Default for Config {
@@ -105,6 +126,7 @@ impl Default for Config {
             target_frame_ms: 33.0,
             adaptive: true,
             layout: None,
+            known_tabs: Tab::ALL.to_vec(),
         }
     }
 }
@@ -132,6 +154,11 @@ impl Config {
         let mut config: Self = serde_json::from_value(value)?;
         // A layout without a view is of no use.
         config.layout = config.layout.filter(|dock| dock.iter_all_tabs().any(|(_, tab)| *tab == Tab::View));
+        if let Some(dock) = &mut config.layout {
+            let new = Tab::ALL.into_iter().filter(|tab| !config.known_tabs.contains(tab));
+            new.for_each(|tab| add_tab(dock, tab));
+        }
+        config.known_tabs = Tab::ALL.to_vec();
         config.window =
             config.window.map(|side| if side.is_finite() { side.clamp(480.0, 16_384.0) } else { 960.0 });
         config.recent.truncate(MOST_RECENT);
@@ -199,6 +226,38 @@ mod tests {
         let mut tabs: Vec<_> = again.layout.unwrap().iter_all_tabs().map(|(_, tab)| *tab).collect();
         tabs.sort();
         assert_eq!(tabs, Tab::ALL);
+    }
+
+    /// The layout in a file without some panels, read again; `known`: the file tells which panels its version had.
+    fn read_without(gone: &[Tab], known: bool) -> DockState<Tab> {
+        let mut layout = default_layout();
+        layout.retain_tabs(|tab| !gone.contains(tab));
+        let mut value = serde_json::to_value(Config { layout: Some(layout), ..Config::default() }).unwrap();
+        if !known {
+            value.as_object_mut().unwrap().remove("known_tabs");
+        }
+        Config::parse(&value.to_string()).unwrap().layout.unwrap()
+    }
+
+    #[test]
+    fn panels_of_later_versions_come_into_an_old_layout_and_closed_ones_stay_closed() {
+        let gone = [Tab::Animation, Tab::Acceleration];
+        let layout = read_without(&gone, false);
+        for tab in gone {
+            let path = layout.find_tab(&tab).unwrap();
+            let beside = layout.find_tab(&Tab::Passes).unwrap();
+            assert_eq!((path.surface, path.node), (beside.surface, beside.node), "{}", tab.name());
+        }
+        let in_front: Vec<Tab> = layout.iter_leaves().map(|(_, leaf)| leaf.tabs[leaf.active.0]).collect();
+        assert!(in_front.iter().all(|tab| !gone.contains(tab)), "{in_front:?}");
+        let closed = read_without(&gone, true);
+        assert!(gone.iter().all(|tab| closed.find_tab(tab).is_none()));
+        // None of its neighbours is left: it stands by itself, and what there was is still seen.
+        let below = [Tab::Animation, Tab::Passes, Tab::Acceleration, Tab::LeftOut, Tab::Health, Tab::Log];
+        let alone = read_without(&below, false);
+        assert!(Tab::ALL.iter().all(|tab| alone.find_tab(tab).is_some()));
+        let view = alone.find_tab(&Tab::View).unwrap();
+        assert_eq!(alone.leaf(view.node_path()).unwrap().tabs, [Tab::View]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use caustica_scene::{Document, MeshId, Primitive, Target};
+use caustica_scene::{Document, MeshId, Target};
 use glam::{DAffine3, DVec3};
 
 /// What is selected. The active target is the one the inspector shows.
@@ -45,9 +45,7 @@ impl Selection {
     pub fn set_primitive(&mut self, document: &Document, index: Option<u32>) {
         let middle = |index: u32| {
             let mesh = document.mesh(document.mesh_of(self.active?)?)?;
-            let primitive = *mesh.primitives.get(index as usize)?;
-            let at_rest = Primitive { mesh_from_primitive: DAffine3::IDENTITY, ..primitive };
-            let (low, high) = mesh.primitive_bounds(&at_rest)?;
+            let (low, high) = mesh.primitive_bounds(index as usize)?;
             Some((index, (low + high) * 0.5))
         };
         self.primitive = index.and_then(middle);
@@ -135,7 +133,9 @@ mod tests {
     use std::sync::Arc;
 
     use caustica_scene::import::Imported;
-    use caustica_scene::{Local, Material, MaterialId, Mesh, MeshData, Node, NodeKind, PartNode, Prefab};
+    use caustica_scene::{
+        Local, Material, MaterialId, Mesh, MeshData, Node, NodeKind, PartNode, Prefab, Primitive,
+    };
     use glam::Vec3;
 
     use super::*;

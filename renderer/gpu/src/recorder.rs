@@ -33,11 +33,11 @@ pub enum Use<'a> {
     Group(ResourceId, Stage, Access),
 }
 
-/// One indexed draw.
+/// One draw.
 #[derive(Clone, Copy)]
 pub struct Draw<'a> {
-    /// 32-bit indices.
-    pub indices: &'a Buffer,
+    /// 32-bit indices; `None`: `gl_VertexIndex` counts up from `first_index`.
+    pub indices: Option<&'a Buffer>,
     /// First index.
     pub first_index: u32,
     /// Number of indices.

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::TextureId;
+use super::{Lobes, TextureId};
 
 /// How a texture is addressed outside 0..1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -150,6 +150,8 @@ pub struct Material {
     pub attenuation_color: Vec3,
     /// Distance of the above in metres; infinity: no attenuation.
     pub attenuation_distance_m: f32,
+    /// Lobes beside these, and textures that few materials have.
+    pub lobes: Option<Box<Lobes>>,
     /// Alpha mode.
     pub alpha: AlphaMode,
     /// Whether the back of a triangle is drawn.
@@ -179,8 +181,23 @@ impl Default for Material {
             volume_priority: 0,
             attenuation_color: Vec3::ONE,
             attenuation_distance_m: f32::INFINITY,
+            lobes: None,
             alpha: AlphaMode::Opaque,
             double_sided: false,
         }
+    }
+}
+
+impl Material {
+    /// Every texture that the material uses.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureUse> {
+        let own = [
+            &self.base_color_texture,
+            &self.metallic_roughness_texture,
+            &self.normal_texture,
+            &self.occlusion_texture,
+            &self.emissive_texture,
+        ];
+        own.into_iter().chain(self.lobes.iter().flat_map(|lobes| lobes.textures())).flatten()
     }
 }

@@ -21,6 +21,24 @@ pub const MATERIAL_ALPHA_MASK: u32 = 4;
 /// [`super::Material::flags`]: alpha is coverage.
 pub const MATERIAL_ALPHA_BLEND: u32 = 8;
 
+/// [`super::MaterialLobes::flags`]: anisotropy.
+pub const LOBE_ANISOTROPY: u32 = 1;
+/// [`super::MaterialLobes::flags`]: clear coat.
+pub const LOBE_CLEARCOAT: u32 = 2;
+/// [`super::MaterialLobes::flags`]: dispersion.
+pub const LOBE_DISPERSION: u32 = 4;
+/// [`super::MaterialLobes::flags`]: thin film.
+pub const LOBE_IRIDESCENCE: u32 = 8;
+/// [`super::MaterialLobes::flags`]: sheen.
+pub const LOBE_SHEEN: u32 = 16;
+/// [`super::MaterialLobes::flags`]: diffuse transmission.
+pub const LOBE_DIFFUSE_TRANSMISSION: u32 = 32;
+/// [`super::MaterialLobes::flags`]: reflectance and glossiness instead of metalness and roughness.
+pub const LOBE_SPECULAR_GLOSSINESS: u32 = 64;
+
+/// Cosines and roughnesses of the table behind [`super::Scene::sheen_albedo`].
+pub const SHEEN_ALBEDO_SIDE: u32 = 32;
+
 /// [`super::Instance::flags`]: the determinant of `render_from_mesh` is below 0.
 pub const INSTANCE_MIRRORED: u32 = 1;
 
@@ -39,6 +57,9 @@ pub const SHAPE_SPHERE: u32 = 0;
 /// [`super::Shape::kind`].
 pub const SHAPE_BOX: u32 = 1;
 
+/// Vertices that raster draws for a shape: the box around it.
+pub const SHAPE_VERTICES: u32 = 36;
+
 /// Bit of an instance mask: met by camera rays.
 pub const MASK_CAMERA: u32 = 1;
 /// Bit of an instance mask: met by shadow rays.
@@ -52,6 +73,9 @@ pub const LIGHT_POINT: u32 = 0;
 pub const LIGHT_SPOT: u32 = 1;
 /// [`super::Light::kind`].
 pub const LIGHT_DIRECTIONAL: u32 = 2;
+
+/// Cosines, and roughnesses, of the table behind [`super::Frame::ggx_albedo`].
+pub const GGX_ALBEDO_SIDE: u32 = 32;
 
 /// [`super::Frame::flags`]: parallel projection.
 pub const FRAME_ORTHOGRAPHIC: u32 = 1;
@@ -103,6 +127,33 @@ pub const SHOW_OCCLUSION: u32 = 11;
 pub const SHOW_MATERIAL: u32 = 12;
 /// Debug view: source_uint = id target.
 pub const SHOW_TRIANGLE: u32 = 13;
+/// Debug view: source_uint = id target.
+pub const SHOW_PRIMITIVE: u32 = 14;
+/// Debug view: source_uint = id target.
+pub const SHOW_FACING: u32 = 15;
+/// Debug view: source_uint = ray depth.
+pub const SHOW_RAY_DEPTH: u32 = 16;
+/// Debug view: source = shadow of one light.
+pub const SHOW_SHADOW: u32 = 17;
+/// Debug view of `show_surface`: edges.
+pub const SHOW_WIREFRAME: u32 = 18;
+/// Debug view of `show_surface`: barycentric coordinates.
+pub const SHOW_BARYCENTRIC: u32 = 19;
+
+/// Bit of [`super::Push::argument0`] of pass `light_shadow`, beside the number of the light: what its image holds is
+/// forgotten.
+pub const LIGHT_SHADOW_FRESH: u32 = 0x8000_0000;
+
+/// Sampler: Owen-scrambled Sobol.
+pub const SAMPLER_SOBOL: u32 = 0;
+/// Sampler: Halton.
+pub const SAMPLER_HALTON: u32 = 1;
+/// Sampler: Hammersley.
+pub const SAMPLER_HAMMERSLEY: u32 = 2;
+/// Sampler: hashed PCG.
+pub const SAMPLER_INDEPENDENT: u32 = 3;
+/// Sampler: Sobol with blue-noise offsets.
+pub const SAMPLER_BLUE_NOISE: u32 = 4;
 
 /// Triangles of one cluster of pass `blas_surface`.
 pub const CLUSTER_TRIANGLES: u32 = 32;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use bytemuck::Pod;
 use caustica_gpu::{Frames, Recorder};
 
-use super::{EnvironmentEntry, InstanceEntry, Inventory, MeshEntry, Place};
+use super::{EnvironmentEntry, InstanceEntry, Inventory, MaterialEntry, MeshEntry, Place};
 use crate::accel::Accel;
 use crate::delta::{InstanceId, MeshId};
 use crate::error::{RendererError, Result};
@@ -42,7 +42,7 @@ struct Downloads {
     scene: Download,
     instances: Download,
     material_slots: Download,
-    materials: Download,
+    materials: (Download, Download),
     lights: Download,
     emissive: (Download, Download),
     environment: Download,
@@ -144,9 +144,12 @@ impl Downloads {
     }
 
     fn add_materials(&self, tables: &Tables, inventory: &mut Inventory) -> Result<()> {
-        let records: Vec<gpu_types::Material> = self.materials.read();
+        let records: Vec<gpu_types::Material> = self.materials.0.read();
+        let lobe_records: Vec<gpu_types::MaterialLobes> = self.materials.1.read();
         for (id, index) in tables.materials.ids() {
             let mut record = at(&records, index, "material")?;
+            let own = std::mem::take(&mut record.lobes).checked_sub(1);
+            let mut lobes = own.map(|index| at(&lobe_records, index, "record of lobes")).transpose()?;
             let textures = [
                 &mut record.base_color_texture,
                 &mut record.metallic_roughness_texture,
@@ -154,11 +157,14 @@ impl Downloads {
                 &mut record.occlusion_texture,
                 &mut record.emissive_texture,
             ]
+            .into_iter()
+            .chain(lobes.iter_mut().flat_map(gpu_types::MaterialLobes::textures_mut))
             .map(|used: &mut TextureUse| {
                 let slot = std::mem::replace(&mut used.texture, NO_TEXTURE);
                 tables.textures.id_of(slot)
-            });
-            inventory.materials.insert(id, (record, textures.to_vec()));
+            })
+            .collect();
+            inventory.materials.insert(id, MaterialEntry { record, lobes, textures });
             inventory.layout.materials.insert(id, index);
         }
         inventory.layout.textures = tables.textures.ids().collect();

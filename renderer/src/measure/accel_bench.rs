@@ -1,29 +1,40 @@
 //! What acceleration structures cost on a device, by the device's own clock. Enters: how many triangles, boxes or
 //! instances. Leaves: milliseconds and bytes. Inputs are generated, lie in spatial order and in memory of the device.
 
+mod inputs;
+
 use std::sync::Arc;
+use std::time::Instant;
 
 use caustica_gpu::{
     AccelBuild, AccelGeometry, AccelStructure, Access, Background, BackgroundWork, BoxGeometry, Buffer,
-    BufferUse, BuildMode, BuildPreference, Device, Frames, GpuError, Location, MemoryUse, Recorder,
-    ResourceId, Stage, TlasInstances, TriangleGeometry, Use, pack_instance,
+    BufferUse, BuildMode, BuildPreference, Device, DeviceKind, Frames, GpuError, Location, MemoryUse,
+    Recorder, ResourceId, Stage, TlasInstances, TriangleGeometry, Use,
 };
-use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::error::{RendererError, Result};
-use crate::tables::order_of;
+use inputs::{CUBE_INDICES, CUBE_POSITIONS, IDENTITY, bumpy_grid, scattered_boxes, scattered_instances};
 
 /// Label of the timed pass.
 const LABEL: &str = "measure.accel";
-/// Unmeasured runs, at the least and at most; they end once the device has worked for `WARM_UP_MS`.
-const WARM_UPS: (usize, usize) = (2, 32);
-const WARM_UP_MS: f64 = 20.0;
+/// Label of the work that keeps the device busy.
+const LOAD_LABEL: &str = "measure.load";
+/// Triangles of the structure that is built over and over for it.
+const LOAD_TRIANGLES: u32 = 100_000;
+/// Device time of one submit of it.
+const LOAD_MS: f64 = 5.0;
+/// Most builds in one submit of it.
+const MOST_LOADS: usize = 64;
+/// A device at rest lowers its clocks, and takes a while under load to raise them again.
+const WARM_UP_MS: f64 = 300.0;
+/// A processor has no clocks of its own to wake.
+const WARM_UP_CPU_MS: f64 = 20.0;
+/// Unmeasured runs: caches fill.
+const UNMEASURED: usize = 2;
 /// Measured runs, at the least and at most; they end once the device has worked for `SAMPLES_MS`.
 const SAMPLES: (usize, usize) = (5, 15);
 const SAMPLES_MS: f64 = 400.0;
-
-const IDENTITY: [[f32; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// Times and sizes of a BLAS; each time is a median.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -57,32 +68,63 @@ pub struct TlasTimes {
     pub bytes: u64,
 }
 
-/// Measures on one device. Every run is a frame of its own that is waited for.
+/// What a structure is built from.
+enum Shape {
+    Triangles(TriangleGeometry),
+    Boxes(BoxGeometry),
+    Instances(TlasInstances),
+}
+
+impl Shape {
+    fn geometry(&self) -> AccelGeometry<'_> {
+        match self {
+            Self::Triangles(one) => AccelGeometry::Triangles(std::slice::from_ref(one)),
+            Self::Boxes(one) => AccelGeometry::Boxes(std::slice::from_ref(one)),
+            Self::Instances(instances) => AccelGeometry::Instances(*instances),
+        }
+    }
+}
+
+/// A shape with the memory that it lies in.
+struct Input {
+    shape: Shape,
+    buffers: Vec<Buffer>,
+    /// What the instances place.
+    _below: Option<BareStructure>,
+}
+
+/// An acceleration structure of generated input with nothing of a scene around it; built already.
+pub struct BareStructure {
+    input: Arc<Input>,
+    preference: BuildPreference,
+    structure: AccelStructure,
+    _scratch: Buffer,
+    scratch_address: u64,
+}
+
+impl BareStructure {
+    fn work(&self, mode: BuildMode) -> AccelBuild<'_> {
+        AccelBuild {
+            target: &self.structure,
+            geometry: self.input.shape.geometry(),
+            preference: self.preference,
+            mode,
+            scratch: self.scratch_address,
+        }
+    }
+}
+
+/// Measures on one device. The medians are of runs with other work right before them in the same submit, so that the
+/// device's clocks are those of a device at work.
 pub struct AccelBench<'a> {
     device: Arc<Device>,
     frames: &'a mut Frames,
     background: Background,
     /// Stands for all structures and scratch memory: one build after the other.
     group: ResourceId,
-}
-
-/// A structure and the scratch memory for its builds.
-struct Room {
-    structure: AccelStructure,
-    scratch: Buffer,
-    alignment: u64,
-}
-
-impl Room {
-    fn build<'a>(
-        &'a self,
-        geometry: AccelGeometry<'a>,
-        preference: BuildPreference,
-        mode: BuildMode,
-    ) -> AccelBuild<'a> {
-        let scratch = self.scratch.address().next_multiple_of(self.alignment);
-        AccelBuild { target: &self.structure, geometry, preference, mode, scratch }
-    }
+    load: Option<BareStructure>,
+    /// Builds of the load in one submit.
+    loads: usize,
 }
 
 impl<'a> AccelBench<'a> {
@@ -91,12 +133,21 @@ impl<'a> AccelBench<'a> {
     /// # Errors
     /// When the driver refuses.
     pub fn new(device: &Arc<Device>, frames: &'a mut Frames) -> Result<Self> {
-        Ok(Self {
+        let mut bench = Self {
             device: Arc::clone(device),
             frames,
             background: Background::new(device)?,
             group: device.new_resource_id(),
-        })
+            load: None,
+            loads: 1,
+        };
+        bench.load = Some(bench.bare_triangles(LOAD_TRIANGLES, BuildPreference::FastTrace)?);
+        let mut once_ms = f64::INFINITY;
+        for _ in 0..=UNMEASURED {
+            once_ms = once_ms.min(bench.submit_load()?);
+        }
+        bench.loads = ((LOAD_MS / once_ms).ceil() as usize).clamp(1, MOST_LOADS);
+        Ok(bench)
     }
 
     /// A BLAS of `count` triangles (at least 1): a bumpy grid.
@@ -104,21 +155,8 @@ impl<'a> AccelBench<'a> {
     /// # Errors
     /// [`RendererError::Limit`] for more than the device takes; when memory runs out; when the device fails.
     pub fn triangles(&mut self, count: u32) -> Result<BlasTimes> {
-        let count = self.checked("triangles", count, self.device.limits().max_primitives)?;
-        let (positions, indices) = bumpy_grid(count);
-        let vertex_count = positions.len() as u32;
-        let positions = self.upload(bytemuck::cast_slice(&positions))?;
-        let indices = self.upload(bytemuck::cast_slice(&indices))?;
-        let transform = self.upload(bytemuck::cast_slice(&IDENTITY))?;
-        let list = [TriangleGeometry {
-            positions: positions.address(),
-            vertex_count,
-            indices: indices.address(),
-            triangle_count: count,
-            transform: transform.address(),
-            opaque: true,
-        }];
-        self.blas(AccelGeometry::Triangles(&list), count, &[&positions, &indices, &transform])
+        let input = self.triangle_input(count)?;
+        self.blas(&input, count.max(1))
     }
 
     /// A BLAS of `count` boxes (at least 1) scattered in a cube.
@@ -128,8 +166,8 @@ impl<'a> AccelBench<'a> {
     pub fn boxes(&mut self, count: u32) -> Result<BlasTimes> {
         let count = self.checked("boxes", count, self.device.limits().max_primitives)?;
         let boxes = self.upload(bytemuck::cast_slice(&scattered_boxes(count)))?;
-        let list = [BoxGeometry { boxes: boxes.address(), count, opaque: true }];
-        self.blas(AccelGeometry::Boxes(&list), count, &[&boxes])
+        let shape = Shape::Boxes(BoxGeometry { boxes: boxes.address(), count, opaque: true });
+        self.blas(&Arc::new(Input { shape, buffers: vec![boxes], _below: None }), count)
     }
 
     /// A TLAS of `count` instances (at least 1) of one cube, scattered in a cube.
@@ -137,56 +175,129 @@ impl<'a> AccelBench<'a> {
     /// # Errors
     /// As [`Self::triangles`].
     pub fn instances(&mut self, count: u32) -> Result<TlasTimes> {
-        let count = self.checked("instances", count, self.device.limits().max_instances)?;
-        let positions = self.upload(bytemuck::cast_slice(&CUBE_POSITIONS))?;
-        let indices = self.upload(bytemuck::cast_slice(&CUBE_INDICES))?;
-        let transform = self.upload(bytemuck::cast_slice(&IDENTITY))?;
-        let cube = [TriangleGeometry {
-            positions: positions.address(),
-            vertex_count: CUBE_POSITIONS.len() as u32,
-            indices: indices.address(),
-            triangle_count: CUBE_INDICES.len() as u32,
-            transform: transform.address(),
-            opaque: true,
-        }];
-        let preference = BuildPreference::FastTrace;
-        let cube_shape = AccelGeometry::Triangles(&cube);
-        let blas = self.room(cube_shape, preference)?;
-        let build = blas.build(cube_shape, preference, BuildMode::Build);
-        self.run(&build, &[&positions, &indices, &transform])?;
-
-        let descriptors = self.upload(&scattered_instances(count, blas.structure.address()))?;
-        let shape = AccelGeometry::Instances(TlasInstances { descriptors: descriptors.address(), count });
-        let tlas = self.room(shape, preference)?;
-        let mut time = |mode| self.time_build(&tlas.build(shape, preference, mode), &[&descriptors]);
+        let tlas = self.bare_instances(count)?;
         Ok(TlasTimes {
-            instances: count,
-            build_ms: time(BuildMode::Build)?,
-            refit_ms: time(BuildMode::Refit)?,
+            instances: count.max(1),
+            build_ms: self.median_of(&tlas, BuildMode::Build)?,
+            refit_ms: self.median_of(&tlas, BuildMode::Refit)?,
             bytes: tlas.structure.size(),
         })
     }
 
-    fn blas(
-        &mut self,
-        geometry: AccelGeometry<'_>,
-        primitives: u32,
-        inputs: &[&Buffer],
-    ) -> Result<BlasTimes> {
-        let fixed = self.room(geometry, BuildPreference::FastTrace)?;
-        let build = fixed.build(geometry, BuildPreference::FastTrace, BuildMode::Build);
-        let build_fast_trace_ms = self.time_build(&build, inputs)?;
+    /// The BLAS of [`Self::triangles`], to be built or refitted between other work.
+    ///
+    /// # Errors
+    /// As [`Self::triangles`].
+    pub fn bare_triangles(&mut self, count: u32, preference: BuildPreference) -> Result<BareStructure> {
+        let input = self.triangle_input(count)?;
+        self.bare(&input, preference)
+    }
+
+    /// The TLAS of [`Self::instances`], likewise.
+    ///
+    /// # Errors
+    /// As [`Self::triangles`].
+    pub fn bare_instances(&mut self, count: u32) -> Result<BareStructure> {
+        let count = self.checked("instances", count, self.device.limits().max_instances)?;
+        let cube = self.mesh_input(&CUBE_POSITIONS, &CUBE_INDICES)?;
+        let blas = self.bare(&Arc::new(cube), BuildPreference::FastTrace)?;
+        let descriptors = self.upload(&scattered_instances(count, blas.structure.address()))?;
+        let shape = Shape::Instances(TlasInstances { descriptors: descriptors.address(), count });
+        let input = Input { shape, buffers: vec![descriptors], _below: Some(blas) };
+        self.bare(&Arc::new(input), BuildPreference::FastTrace)
+    }
+
+    /// Builds (or, with [`BuildMode::Refit`], refits) once in a frame of its own and waits. Milliseconds on the device, with
+    /// the clocks that it happens to have.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn run(&mut self, bare: &BareStructure, mode: BuildMode) -> Result<f64> {
+        let uses = self.uses(&bare.input);
+        self.timed(false, &mut |recorder| recorder.build(&[bare.work(mode)], &uses))
+    }
+
+    /// Keeps the device at work without a gap for `ms` milliseconds at the least, and waits for it.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn keep_busy(&mut self, ms: f64) -> Result<()> {
+        let start = Instant::now();
+        while start.elapsed().as_secs_f64() * 1e3 < ms {
+            let mut recorder = self.frames.begin()?;
+            self.record_load(&mut recorder)?;
+            self.frames.submit(recorder, None)?;
+        }
+        Ok(self.frames.finish()?)
+    }
+
+    /// Keeps the device busy until it has the clocks of a device at work.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn warm_up(&mut self) -> Result<()> {
+        let cpu = self.device.kind() == DeviceKind::Cpu;
+        self.keep_busy(if cpu { WARM_UP_CPU_MS } else { WARM_UP_MS })
+    }
+
+    /// Positions and corners of the triangles that [`Self::triangles`] builds.
+    pub fn grid(count: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+        bumpy_grid(count.max(1))
+    }
+
+    fn triangle_input(&mut self, count: u32) -> Result<Arc<Input>> {
+        let count = self.checked("triangles", count, self.device.limits().max_primitives)?;
+        let (positions, indices) = bumpy_grid(count);
+        Ok(Arc::new(self.mesh_input(&positions, &indices)?))
+    }
+
+    fn mesh_input(&mut self, positions: &[[f32; 3]], indices: &[[u32; 3]]) -> Result<Input> {
+        let places = self.upload(bytemuck::cast_slice(positions))?;
+        let corners = self.upload(bytemuck::cast_slice(indices))?;
+        let transform = self.upload(bytemuck::cast_slice(&IDENTITY))?;
+        let shape = Shape::Triangles(TriangleGeometry {
+            positions: places.address(),
+            vertex_count: positions.len() as u32,
+            indices: corners.address(),
+            triangle_count: indices.len() as u32,
+            transform: transform.address(),
+            opaque: true,
+        });
+        Ok(Input { shape, buffers: vec![places, corners, transform], _below: None })
+    }
+
+    /// Makes a structure and builds it, so that it may be refitted.
+    fn bare(&mut self, input: &Arc<Input>, preference: BuildPreference) -> Result<BareStructure> {
+        let geometry = input.shape.geometry();
+        let sizes = self.device.build_sizes(geometry, preference);
+        let top_level = matches!(geometry, AccelGeometry::Instances(_));
+        let alignment = self.device.limits().scratch_alignment.max(1);
+        let scratch_bytes = sizes.build_scratch.max(sizes.refit_scratch) + alignment;
+        let (usage, kind) = (BufferUse::General, MemoryUse::AccelerationStructures);
+        let scratch = Buffer::new(&self.device, "scratch", scratch_bytes, usage, Location::Device, kind)?;
+        let bare = BareStructure {
+            input: Arc::clone(input),
+            preference,
+            structure: AccelStructure::new(&self.device, "measured", sizes.structure, top_level)?,
+            scratch_address: scratch.address().next_multiple_of(alignment),
+            _scratch: scratch,
+        };
+        self.run(&bare, BuildMode::Build)?;
+        Ok(bare)
+    }
+
+    fn blas(&mut self, input: &Arc<Input>, primitives: u32) -> Result<BlasTimes> {
+        let fixed = self.bare(input, BuildPreference::FastTrace)?;
+        let build_fast_trace_ms = self.median_of(&fixed, BuildMode::Build)?;
         let (compact_ms, compacted_bytes) = self.compaction(&fixed.structure)?;
         let bytes = fixed.structure.size();
         drop(fixed);
-        let moving = self.room(geometry, BuildPreference::FastBuild)?;
-        let mut time =
-            |mode| self.time_build(&moving.build(geometry, BuildPreference::FastBuild, mode), inputs);
+        let moving = self.bare(input, BuildPreference::FastBuild)?;
         Ok(BlasTimes {
             primitives,
             build_fast_trace_ms,
-            build_fast_build_ms: time(BuildMode::Build)?,
-            refit_ms: time(BuildMode::Refit)?,
+            build_fast_build_ms: self.median_of(&moving, BuildMode::Build)?,
+            refit_ms: self.median_of(&moving, BuildMode::Refit)?,
             compact_ms,
             bytes,
             compacted_bytes,
@@ -203,71 +314,68 @@ impl<'a> AccelBench<'a> {
         Ok((ms, size))
     }
 
-    fn time_build(&mut self, build: &AccelBuild<'_>, inputs: &[&Buffer]) -> Result<f64> {
-        let uses = self.uses(inputs);
-        self.median(|recorder| recorder.build(&[*build], &uses))
+    fn median_of(&mut self, bare: &BareStructure, mode: BuildMode) -> Result<f64> {
+        let uses = self.uses(&bare.input);
+        self.median(|recorder| recorder.build(&[bare.work(mode)], &uses))
     }
 
-    /// Builds once, without measuring.
-    fn run(&mut self, build: &AccelBuild<'_>, inputs: &[&Buffer]) -> Result<()> {
-        let uses = self.uses(inputs);
-        self.once(&mut |recorder| recorder.build(&[*build], &uses)).map(|_| ())
-    }
-
-    fn uses<'b>(&self, inputs: &[&'b Buffer]) -> Vec<Use<'b>> {
-        let read = |buffer: &&'b Buffer| Use::Buffer(buffer, Stage::AccelBuild, Access::BuildInput);
+    fn uses<'b>(&self, input: &'b Input) -> Vec<Use<'b>> {
+        let read = |buffer: &'b Buffer| Use::Buffer(buffer, Stage::AccelBuild, Access::BuildInput);
         let written = Use::Group(self.group, Stage::AccelBuild, Access::AccelWrite);
-        inputs.iter().map(read).chain([written]).collect()
+        input.buffers.iter().map(read).chain([written]).collect()
     }
 
-    /// Median milliseconds of what `record` records. The first runs are not counted: clocks rise, caches fill.
+    /// Median milliseconds of what `record` records.
     fn median(&mut self, mut record: impl FnMut(&mut Recorder)) -> Result<f64> {
-        self.repeat(WARM_UPS, WARM_UP_MS, &mut record)?;
-        let mut times = self.repeat(SAMPLES, SAMPLES_MS, &mut record)?;
+        self.warm_up()?;
+        for _ in 0..UNMEASURED {
+            self.timed(true, &mut record)?;
+        }
+        let (least, most) = SAMPLES;
+        let mut times: Vec<f64> = Vec::with_capacity(most);
+        while times.len() < least || (times.len() < most && times.iter().sum::<f64>() < SAMPLES_MS) {
+            times.push(self.timed(true, &mut record)?);
+        }
         times.sort_by(f64::total_cmp);
         times.get(times.len() / 2).copied().ok_or_else(|| unmeasured("no run"))
     }
 
-    fn repeat(
-        &mut self,
-        (least, most): (usize, usize),
-        enough_ms: f64,
-        record: &mut impl FnMut(&mut Recorder),
-    ) -> Result<Vec<f64>> {
-        let mut times = Vec::with_capacity(most);
-        let mut spent_ms = 0.0;
-        while times.len() < least || (times.len() < most && spent_ms < enough_ms) {
-            let ms = self.once(record)?;
-            spent_ms += ms;
-            times.push(ms);
-        }
-        Ok(times)
-    }
-
-    fn once(&mut self, record: &mut impl FnMut(&mut Recorder)) -> Result<f64> {
+    /// Milliseconds of what `record` records in a frame of its own. `loaded`: right behind other work.
+    fn timed(&mut self, loaded: bool, record: &mut impl FnMut(&mut Recorder)) -> Result<f64> {
         let mut recorder = self.frames.begin()?;
+        if loaded {
+            self.record_load(&mut recorder)?;
+        }
         recorder.pass(LABEL, |recorder| {
             record(recorder);
             Ok::<(), GpuError>(())
         })?;
         self.frames.submit(recorder, None)?;
-        self.frames.finish()?;
-        let passes = &self.frames.finished().passes;
-        let time = passes.iter().find(|pass| pass.label == LABEL).map(|pass| pass.ms);
-        time.ok_or_else(|| unmeasured("the device gave no time"))
+        self.time_of(LABEL)
     }
 
-    fn room(&self, geometry: AccelGeometry<'_>, preference: BuildPreference) -> Result<Room> {
-        let sizes = self.device.build_sizes(geometry, preference);
-        let top_level = matches!(geometry, AccelGeometry::Instances(_));
-        let alignment = self.device.limits().scratch_alignment.max(1);
-        let scratch_bytes = sizes.build_scratch.max(sizes.refit_scratch) + alignment;
-        let (usage, kind) = (BufferUse::General, MemoryUse::AccelerationStructures);
-        Ok(Room {
-            structure: AccelStructure::new(&self.device, "measured", sizes.structure, top_level)?,
-            scratch: Buffer::new(&self.device, "scratch", scratch_bytes, usage, Location::Device, kind)?,
-            alignment,
-        })
+    fn submit_load(&mut self) -> Result<f64> {
+        let mut recorder = self.frames.begin()?;
+        self.record_load(&mut recorder)?;
+        self.frames.submit(recorder, None)?;
+        self.time_of(LOAD_LABEL)
+    }
+
+    fn record_load(&self, recorder: &mut Recorder) -> Result<()> {
+        let Some(load) = &self.load else { return Ok(()) };
+        let uses = self.uses(&load.input);
+        recorder.pass(LOAD_LABEL, |recorder| {
+            (0..self.loads).for_each(|_| recorder.build(&[load.work(BuildMode::Build)], &uses));
+            Ok::<(), GpuError>(())
+        })?;
+        Ok(())
+    }
+
+    fn time_of(&mut self, label: &str) -> Result<f64> {
+        self.frames.finish()?;
+        let passes = &self.frames.finished().passes;
+        let time = passes.iter().find(|pass| pass.label == label).map(|pass| pass.ms);
+        time.ok_or_else(|| unmeasured("the device gave no time"))
     }
 
     fn upload(&mut self, bytes: &[u8]) -> Result<Buffer> {
@@ -291,132 +399,4 @@ impl<'a> AccelBench<'a> {
 
 fn unmeasured(reason: &str) -> RendererError {
     RendererError::Profile { what: String::from(LABEL), reason: reason.to_owned() }
-}
-
-/// The corners of a unit cube, x first.
-const CUBE_POSITIONS: [[f32; 3]; 8] = [
-    [0.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [1.0, 1.0, 0.0],
-    [0.0, 0.0, 1.0],
-    [1.0, 0.0, 1.0],
-    [0.0, 1.0, 1.0],
-    [1.0, 1.0, 1.0],
-];
-
-const CUBE_INDICES: [[u32; 3]; 12] = [
-    [0, 2, 1],
-    [1, 2, 3],
-    [4, 5, 6],
-    [5, 7, 6],
-    [0, 1, 4],
-    [1, 5, 4],
-    [2, 6, 3],
-    [3, 6, 7],
-    [0, 4, 2],
-    [2, 4, 6],
-    [1, 3, 5],
-    [3, 7, 5],
-];
-
-/// The smallest whole number whose power is at least `count`.
-fn side_of(count: u32, power: u32) -> u32 {
-    let enough = |side: u32| u64::from(side).pow(power) >= u64::from(count);
-    let guess = f64::from(count).powf(1.0 / f64::from(power)) as u32;
-    // The root is rounded: the side is one of a few near it.
-    (guess.saturating_sub(1).max(1)..).find(|side| enough(*side)).unwrap_or(guess)
-}
-
-/// Exactly `count` triangles on a square grid of shared vertices with bumps, along a Morton curve.
-fn bumpy_grid(count: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
-    let side = side_of(count.div_ceil(2), 2);
-    let row = side + 1;
-    let height = |x: u32, y: u32| (x as f32 * 0.7).sin() * (y as f32 * 0.45).cos();
-    let positions =
-        (0..row).flat_map(|y| (0..row).map(move |x| [x as f32, y as f32, height(x, y)])).collect();
-    let cells: Vec<DVec3> =
-        (0..side).flat_map(|y| (0..side).map(move |x| DVec3::new(f64::from(x), f64::from(y), 0.0))).collect();
-    let triangles = order_of(&cells)
-        .into_iter()
-        .flat_map(|cell| {
-            let corner = cell / side * row + cell % side;
-            [[corner, corner + 1, corner + row], [corner + 1, corner + row + 1, corner + row]]
-        })
-        .take(count as usize)
-        .collect();
-    (positions, triangles)
-}
-
-/// `count` cells of a cube of cells 2 apart, along a Morton curve.
-fn scattered(count: u32) -> impl Iterator<Item = (u32, Vec3)> {
-    let side = side_of(count, 3);
-    let at =
-        move |i: u32| DVec3::new(f64::from(i % side), f64::from(i / side % side), f64::from(i / side / side));
-    let cells: Vec<DVec3> = (0..count).map(at).collect();
-    order_of(&cells).into_iter().map(move |i| (i, at(i).as_vec3() * 2.0))
-}
-
-/// Boxes of sides 0.5 to 1.5.
-fn scattered_boxes(count: u32) -> Vec<[f32; 6]> {
-    scattered(count)
-        .map(|(i, low)| {
-            let high = low + 0.5 + (i % 11) as f32 * 0.1;
-            [low.x, low.y, low.z, high.x, high.y, high.z]
-        })
-        .collect()
-}
-
-/// Packed descriptors of unit cubes.
-fn scattered_instances(count: u32, blas_address: u64) -> Vec<u8> {
-    scattered(count)
-        .flat_map(|(i, at)| {
-            let mut transform = IDENTITY;
-            for (row, shift) in transform.iter_mut().zip(at.to_array()) {
-                row[3] = shift;
-            }
-            pack_instance(transform, i, 0xff, 0, blas_address)
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_side_holds_the_count_and_no_less_would() {
-        for (count, power) in [(1, 2), (2, 2), (4, 2), (5, 2), (50_000, 2), (27, 3), (28, 3), (2_000_000, 3)]
-        {
-            let side = side_of(count, power);
-            assert!(u64::from(side).pow(power) >= u64::from(count), "{side} for {count}");
-            assert!(u64::from(side - 1).pow(power) < u64::from(count), "{side} for {count}");
-        }
-    }
-
-    #[test]
-    fn the_grid_has_the_triangles_asked_for_each_once() {
-        for count in [1, 2, 7, 1000] {
-            let (positions, mut triangles) = bumpy_grid(count);
-            assert_eq!(triangles.len(), count as usize);
-            assert!(triangles.iter().flatten().all(|vertex| (*vertex as usize) < positions.len()));
-            triangles.sort_unstable();
-            triangles.dedup();
-            assert_eq!(triangles.len(), count as usize, "no triangle twice");
-        }
-    }
-
-    #[test]
-    fn boxes_and_instances_are_distinct_and_neighbours_lie_together() {
-        let boxes = scattered_boxes(1000);
-        assert!(boxes.iter().all(|b| b[0] < b[3] && b[1] < b[4] && b[2] < b[5]));
-        let near = boxes.windows(2).filter(|pair| {
-            let step: f32 = (0..3).map(|axis| (pair[0][axis] - pair[1][axis]).abs()).sum();
-            assert!(step > 0.0, "two boxes in one place");
-            step <= 4.0
-        });
-        // Three in four steps of a Morton curve go to a neighbour or across one edge of a block of eight.
-        assert!(near.count() > 700);
-        assert_eq!(scattered_instances(10, 7).len(), 640);
-    }
 }

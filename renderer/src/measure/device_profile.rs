@@ -58,7 +58,7 @@ pub struct ProfileInForce {
 }
 
 impl DeviceProfile {
-    /// Measures a device; takes about a second. `progress` is told what is measured next.
+    /// Measures a device; takes a few seconds. `progress` is told what is measured next.
     ///
     /// # Errors
     /// When memory runs out or the device fails.

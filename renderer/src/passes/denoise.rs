@@ -115,22 +115,7 @@ impl Filter {
         parity: usize,
         filled: usize,
     ) -> Result<()> {
-        let binds = |from: Signals<'_>, to: Signals<'_>| -> [(&'static str, _); 11] {
-            let named = [
-                ("gbuffer_id", &targets.id),
-                ("gbuffer_normal", &targets.normal[parity % targets.normal.len()]),
-                ("gbuffer_depth", &targets.depth[parity % targets.depth.len()]),
-                ("image_of_surface", &history.image[filled]),
-                ("moments", &history.moments[filled]),
-                ("in_diffuse", from[0]),
-                ("in_specular", from[1]),
-                ("in_reflected", from[2]),
-                ("out_diffuse", to[0]),
-                ("out_specular", to[1]),
-                ("out_reflected", to[2]),
-            ];
-            named.map(|(name, image)| (name, Bind::Image(image)))
-        };
+        let binds = |from, to| filter_binds(targets, history, (parity, filled), from, to);
         let [a, b] = [history.filtered[0].each_ref(), history.filtered[1].each_ref()];
         let past = [&history.diffuse[filled], &history.specular[filled], &history.reflected[filled]];
         scope.compute(recorder, "denoise.variance", &self.variance, &binds(past, a), &[], 0)?;
@@ -140,4 +125,28 @@ impl Filter {
         }
         Ok(())
     }
+}
+
+/// What the steps of the filter read and write: light goes from `from` to `to`.
+fn filter_binds<'a>(
+    targets: &'a Targets,
+    history: &'a History,
+    (parity, filled): (usize, usize),
+    from: Signals<'a>,
+    to: Signals<'a>,
+) -> [(&'static str, Bind<'a>); 11] {
+    let named = [
+        ("gbuffer_id", &targets.id),
+        ("gbuffer_normal", &targets.normal[parity % targets.normal.len()]),
+        ("gbuffer_depth", &targets.depth[parity % targets.depth.len()]),
+        ("image_of_surface", &history.image[filled]),
+        ("moments", &history.moments[filled]),
+        ("in_diffuse", from[0]),
+        ("in_specular", from[1]),
+        ("in_reflected", from[2]),
+        ("out_diffuse", to[0]),
+        ("out_specular", to[1]),
+        ("out_reflected", to[2]),
+    ];
+    named.map(|(name, image)| (name, Bind::Image(image)))
 }

@@ -2,21 +2,28 @@
 //! motion, depth. By raster (ids first, then resolved once a pixel) or by rays, with the same result.
 
 use caustica_gpu::{
-    Bind, ColorTarget, ComputePipeline, Draw, Format, GraphicsDesc, GraphicsPipeline, Image,
+    Bind, ColorTarget, ComputePipeline, CullMode, Draw, Format, GraphicsDesc, GraphicsPipeline, Image,
     RayTracingPipeline, Recorder, Stage,
 };
 
 use super::{Builder, Scope};
 use crate::error::Result;
-use crate::gpu_types::Push;
+use crate::gpu_types::{Push, SHAPE_VERTICES};
 use crate::shader::merge_interfaces;
 use crate::tables::Batch;
 use crate::view::Targets;
 
 /// The pass.
 pub(crate) enum GBuffer {
-    Raster { opaque: GraphicsPipeline, alpha: Option<GraphicsPipeline>, resolve: ComputePipeline },
-    Rays { trace: RayTracingPipeline },
+    Raster {
+        opaque: GraphicsPipeline,
+        alpha: Option<GraphicsPipeline>,
+        shapes: Option<GraphicsPipeline>,
+        resolve: ComputePipeline,
+    },
+    Rays {
+        trace: RayTracingPipeline,
+    },
 }
 
 impl GBuffer {
@@ -24,11 +31,20 @@ impl GBuffer {
         if builder.needs.primary_rays {
             return Ok(Self::Rays { trace: builder.rays("gbuffer.trace", "passes/gbuffer/gbuffer.rgen")? });
         }
-        let alpha = builder.needs.alpha;
+        let needs = builder.needs;
+        let mut raster = |label, vertex, fragment| raster(builder, label, vertex, fragment);
+        let triangles = "passes/gbuffer/visibility.vert";
         Ok(Self::Raster {
-            opaque: raster(builder, "gbuffer.raster", "passes/gbuffer/visibility.frag")?,
-            alpha: alpha
-                .then(|| raster(builder, "gbuffer.raster alpha", "passes/gbuffer/visibility_alpha.frag"))
+            opaque: raster("gbuffer.raster", triangles, "passes/gbuffer/visibility.frag")?,
+            alpha: needs
+                .alpha
+                .then(|| raster("gbuffer.raster alpha", triangles, "passes/gbuffer/visibility_alpha.frag"))
+                .transpose()?,
+            shapes: needs
+                .shapes
+                .then(|| {
+                    raster("gbuffer.raster shapes", "passes/gbuffer/shape.vert", "passes/gbuffer/shape.frag")
+                })
                 .transpose()?,
             resolve: builder.compute("gbuffer.resolve", "passes/gbuffer/resolve.comp")?,
         })
@@ -57,16 +73,22 @@ impl GBuffer {
             Self::Rays { trace } => {
                 scope.rays(recorder, "gbuffer.trace", trace, &binds, 0..scope.extent[1], 1)
             }
-            Self::Raster { opaque, alpha, resolve } => {
-                draw(recorder, scope, opaque, alpha.as_ref(), &targets.id, depth)?;
+            Self::Raster { opaque, alpha, shapes, resolve } => {
+                let pipelines = [Some(opaque), alpha.as_ref(), shapes.as_ref()];
+                draw(recorder, scope, pipelines, &targets.id, depth)?;
                 scope.compute(recorder, "gbuffer.resolve", resolve, &binds, &[], 0)
             }
         }
     }
 }
 
-fn raster(builder: &mut Builder<'_>, label: &str, fragment_file: &str) -> Result<GraphicsPipeline> {
-    let vertex = builder.library.stage("passes/gbuffer/visibility.vert")?;
+fn raster(
+    builder: &mut Builder<'_>,
+    label: &str,
+    vertex_file: &str,
+    fragment_file: &str,
+) -> Result<GraphicsPipeline> {
+    let vertex = builder.library.stage(vertex_file)?;
     let fragment = builder.library.stage(fragment_file)?;
     let interface = merge_interfaces(&[&vertex, &fragment])?;
     let desc = GraphicsDesc {
@@ -79,26 +101,24 @@ fn raster(builder: &mut Builder<'_>, label: &str, fragment_file: &str) -> Result
     Ok(GraphicsPipeline::new(builder.device, &desc, &interface, &builder.specialization, Some(builder.set))?)
 }
 
+/// `pipelines`: of opaque triangles, of triangles with alpha, of shapes.
 fn draw(
     recorder: &mut Recorder,
     scope: &Scope<'_>,
-    opaque: &GraphicsPipeline,
-    alpha: Option<&GraphicsPipeline>,
+    pipelines: [Option<&GraphicsPipeline>; 3],
     id: &Image,
     depth: &Image,
 ) -> Result<()> {
     let batches: Vec<Batch> = scope.tables.draws.batches().collect();
     let pushes: Vec<Push> = batches.iter().map(|batch| scope.push(batch.key.geometry, 0)).collect();
-    let mut solid = Vec::new();
-    let mut holes = Vec::new();
+    let mut lists: [Vec<Draw<'_>>; 3] = Default::default();
     for (batch, push) in batches.iter().zip(&pushes) {
-        let list = if batch.key.alpha { &mut holes } else { &mut solid };
-        list.push(draw_of(scope, batch, push)?);
+        let draw = draw_of(scope, batch, push)?;
+        let list = if draw.indices.is_none() { 2 } else { usize::from(batch.key.alpha) };
+        lists[list].push(draw);
     }
-    let mut pipelines: Vec<(&GraphicsPipeline, &[Draw<'_>])> = vec![(opaque, &solid)];
-    if let Some(alpha) = alpha {
-        pipelines.push((alpha, &holes));
-    }
+    let pipelines: Vec<(&GraphicsPipeline, &[Draw<'_>])> =
+        pipelines.into_iter().zip(&lists).filter_map(|(pipeline, list)| Some((pipeline?, &**list))).collect();
     let uses = scope.tables.uses(Stage::Raster);
     recorder.pass("gbuffer.raster", |recorder| {
         recorder.draw(&pipelines, Some(scope.set), &[], &uses, &[id], Some(depth), scope.extent)
@@ -109,8 +129,8 @@ fn draw(
 fn draw_of<'a>(scope: &Scope<'a>, batch: &Batch, push: &'a Push) -> Result<Draw<'a>> {
     let mesh = scope.tables.meshes.get(batch.key.mesh)?;
     let geometry = &mesh.host.geometries[batch.key.geometry as usize];
-    Ok(Draw {
-        indices: &mesh.vertices.indices,
+    let mut draw = Draw {
+        indices: Some(&mesh.vertices.indices),
         first_index: geometry.first_index,
         index_count: geometry.index_count,
         first_instance: batch.first_instance,
@@ -118,5 +138,12 @@ fn draw_of<'a>(scope: &Scope<'a>, batch: &Batch, push: &'a Push) -> Result<Draw<
         cull: batch.key.cull,
         clockwise: batch.key.mirrored,
         push: bytemuck::bytes_of(push),
-    })
+    };
+    if mesh.shapes.is_some() {
+        draw.indices = None;
+        draw.first_index = 0;
+        draw.index_count = geometry.index_count.saturating_mul(SHAPE_VERTICES);
+        draw.cull = CullMode::Back; // of the box around a shape: which sides are seen, the fragment stage decides
+    }
+    Ok(draw)
 }

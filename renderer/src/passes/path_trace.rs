@@ -34,6 +34,7 @@ impl PathTrace {
         let binds = [
             ("gbuffer_id", Bind::Image(&targets.id)),
             ("shaded", Bind::Image(&targets.shaded)),
+            ("ray_depth", Bind::Image(&targets.ray_depth)),
             ("direct_diffuse", Bind::Image(light)),
             ("reflected", Bind::Image(&targets.reflected)),
             ("reflected_tint", Bind::Image(&targets.reflected_tint)),

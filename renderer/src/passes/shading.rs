@@ -45,6 +45,7 @@ impl Shading {
             ("shaded", Bind::Image(&targets.shaded)),
             ("reflected", Bind::Image(&targets.reflected)),
             ("reflected_tint", Bind::Image(&targets.reflected_tint)),
+            ("ray_depth", Bind::Image(&targets.ray_depth)),
         ];
         let has_light = u32::from(light.is_some());
         match self {

@@ -31,15 +31,16 @@ impl Temporal {
         moments: bool,
     ) -> Result<()> {
         let unused = scope.tables.textures.white();
-        let light = |image: &'_ Option<caustica_gpu::Image>| Bind::Image(image.as_ref().unwrap_or(unused));
+        let [diffuse, specular] = [&targets.direct_diffuse, &targets.direct_specular]
+            .map(|image| Bind::Image(image.as_ref().unwrap_or(unused)));
         let (now, past) = (parity % 2, (parity + 1) % 2);
         let (filled, old) = (moving.filled, 1 - moving.filled);
         let binds = [
             ("gbuffer_id", Bind::Image(&targets.id)),
             ("gbuffer_normal", Bind::Image(&targets.normal[now])),
             ("gbuffer_motion", Bind::Image(&targets.motion)),
-            ("direct_diffuse", light(&targets.direct_diffuse)),
-            ("direct_specular", light(&targets.direct_specular)),
+            ("direct_diffuse", diffuse),
+            ("direct_specular", specular),
             ("reflected", Bind::Image(&targets.reflected)),
             ("previous_depth", Bind::Image(&targets.depth[past])),
             ("previous_normal", Bind::Image(&targets.normal[past])),

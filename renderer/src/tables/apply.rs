@@ -18,6 +18,8 @@ struct Others {
     meshes: BTreeSet<MeshId>,
     /// Of another kind than before.
     materials: BTreeSet<MaterialId>,
+    /// They began or ended to shine.
+    shining: BTreeSet<MaterialId>,
 }
 
 impl Tables {
@@ -36,6 +38,7 @@ impl Tables {
         self.apply_materials(recorder, delta, &mut others)?;
         let mut redrawn = self.apply_instances(delta, changed)?;
         self.follow_others(&others, changed, &mut redrawn)?;
+        self.follow_shine(&others.shining);
         // Last: a pose is for the mesh as it is now.
         for (id, pose) in &delta.poses {
             self.deforming.set_pose(*id, pose)?;
@@ -104,6 +107,7 @@ impl Tables {
             match self.materials.set(*id, material, &self.textures) {
                 MaterialChange::Values => {}
                 MaterialChange::Emission => self.emissive.mark_stale(),
+                MaterialChange::Shine => _ = others.shining.insert(*id),
                 MaterialChange::Kind => {
                     others.materials.insert(*id);
                 }
@@ -178,6 +182,18 @@ impl Tables {
             redrawn.insert(slot);
         }
         Ok(())
+    }
+
+    /// Rays meet what begins or ends to shine as before: the emitters alone are others.
+    fn follow_shine(&mut self, materials: &BTreeSet<MaterialId>) {
+        if materials.is_empty() {
+            return;
+        }
+        for (slot, entry) in self.instances.iter() {
+            if entry.instance.materials.iter().any(|id| materials.contains(id)) {
+                self.emissive.follow(slot, &self.instances, &self.materials);
+            }
+        }
     }
 
     /// Address of the geometry records of an instance: its own when it deforms, else those of its mesh.

@@ -82,9 +82,6 @@ impl Draws {
         self.take_out(slot);
         let Some(entry) = instances.get(slot).filter(|entry| is_drawn(entry)) else { return };
         let Ok(mesh) = meshes.get(entry.instance.mesh) else { return };
-        if mesh.shapes.is_some() {
-            return; // met by rays alone
-        }
         let mirrored = instances.is_mirrored(slot);
         for (geometry, id) in entry.instance.materials.iter().enumerate() {
             let Some(material) = materials.get(*id) else { continue };

@@ -35,6 +35,8 @@ pub(crate) struct Instances {
     moved_last_frame: BTreeSet<u32>,
     /// How many (instance, geometry) pairs have a material.
     uses: BTreeMap<MaterialId, u32>,
+    /// Materials that came into use, or out of it, since they were last asked for.
+    newly_used: BTreeSet<MaterialId>,
 }
 
 impl Instances {
@@ -48,6 +50,7 @@ impl Instances {
             free_ranges: BTreeMap::new(),
             moved_last_frame: BTreeSet::new(),
             uses: BTreeMap::new(),
+            newly_used: BTreeSet::new(),
         }
     }
 
@@ -73,7 +76,11 @@ impl Instances {
             self.slots.resize_with(slot as usize + 1, || None);
         }
         for id in &instance.materials {
-            *self.uses.entry(*id).or_default() += 1;
+            let count = self.uses.entry(*id).or_default();
+            *count += 1;
+            if *count == 1 {
+                self.newly_used.insert(*id);
+            }
         }
         let material_base = match old {
             Some(old) => {
@@ -181,6 +188,7 @@ impl Instances {
                 *count -= 1;
                 if *count == 0 {
                     self.uses.remove(id);
+                    self.newly_used.insert(*id);
                 }
             }
         }
@@ -220,6 +228,16 @@ impl Instances {
     /// Every material in use, once.
     pub(crate) fn materials_in_use(&self) -> impl Iterator<Item = MaterialId> {
         self.uses.keys().copied()
+    }
+
+    /// Whether some instance has a material.
+    pub(crate) fn uses_material(&self, id: MaterialId) -> bool {
+        self.uses.contains_key(&id)
+    }
+
+    /// Materials that came into use, or out of it, since the last call.
+    pub(crate) fn take_newly_used(&mut self) -> BTreeSet<MaterialId> {
+        std::mem::take(&mut self.newly_used)
     }
 
     /// Where an instance was in the last frame.

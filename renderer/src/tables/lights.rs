@@ -52,6 +52,13 @@ impl Lights {
         self.table.len() as u32
     }
 
+    /// Number in the table of a light that shines; `None`: of the first.
+    pub(crate) fn index_of(&self, id: Option<LightId>) -> Option<u32> {
+        let mut shining = self.by_id.iter().filter(|(_, light)| power_of(light) > 0.0);
+        let index = shining.position(|(other, _)| id.is_none_or(|id| id == *other))?;
+        u32::try_from(index).ok()
+    }
+
     /// Whether every light is a point, so that one ray decides its shadow.
     pub(crate) fn all_hard(&self) -> bool {
         self.by_id.values().all(|light| match light {

@@ -6,13 +6,15 @@ use std::sync::Arc;
 use caustica_gpu::{Device, Recorder};
 use glam::Vec3;
 
+use super::lobes::{flags_of, pack_lobes};
+use super::sheen::albedo_table;
 use super::table::{Download, Table};
 use super::textures::Textures;
 use crate::delta::{self, AlphaMode, MaterialId, ShadingMode};
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{
-    self, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_DOUBLE_SIDED, MATERIAL_HAS_VOLUME, MODE_PBR,
-    MODE_REFLECTIVE, MODE_REFRACTIVE, MODE_UNLIT, NO_TEXTURE,
+    self, LOBE_SHEEN, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_DOUBLE_SIDED, MATERIAL_HAS_VOLUME,
+    MODE_PBR, MODE_REFLECTIVE, MODE_REFRACTIVE, MODE_UNLIT, NO_TEXTURE,
 };
 
 /// All materials, by id.
@@ -20,11 +22,22 @@ pub(crate) struct Materials {
     table: Table<gpu_types::Material>,
     by_id: BTreeMap<MaterialId, (u32, delta::Material)>,
     free: Vec<u32>,
+    lobes: Table<gpu_types::MaterialLobes>,
+    free_lobes: Vec<u32>,
+    /// Filled when the first material with sheen comes.
+    sheen_albedo: Table<f32>,
 }
 
 impl Materials {
     pub(crate) fn new(device: &Arc<Device>) -> Self {
-        Self { table: Table::new(device, "materials"), by_id: BTreeMap::new(), free: Vec::new() }
+        Self {
+            table: Table::new(device, "materials"),
+            by_id: BTreeMap::new(),
+            free: Vec::new(),
+            lobes: Table::new(device, "material lobes"),
+            free_lobes: Vec::new(),
+            sheen_albedo: Table::new(device, "sheen albedo"),
+        }
     }
 
     /// Index in the shader's table.
@@ -50,19 +63,42 @@ impl Materials {
             Some((index, _)) => *index,
             None => self.free.pop().unwrap_or(self.table.len() as u32),
         };
-        self.table.set(index as usize, pack(material, textures));
+        let known = old.and_then(|_| self.table.get(index as usize)).map_or(0, |record| record.lobes);
+        let lobes = self.set_lobes(known, material, textures);
+        self.table.set(index as usize, gpu_types::Material { lobes, ..pack(material, textures) });
         self.by_id.insert(id, (index, material.clone()));
         change
+    }
+
+    /// Sets, makes or gives up the record of the lobes: `known` and the result are 1 + its index, or 0.
+    fn set_lobes(&mut self, known: u32, material: &delta::Material, textures: &Textures) -> u32 {
+        let Some(lobes) = material.lobes.as_deref().filter(|lobes| !lobes.is_plain()) else {
+            self.free_lobes.extend(known.checked_sub(1));
+            return 0;
+        };
+        let index = match known.checked_sub(1) {
+            Some(index) => index,
+            None => self.free_lobes.pop().unwrap_or(self.lobes.len() as u32),
+        };
+        if flags_of(lobes) & LOBE_SHEEN != 0 && self.sheen_albedo.len() == 0 {
+            self.sheen_albedo.replace(albedo_table().to_vec());
+        }
+        self.lobes.set(index as usize, pack_lobes(lobes, textures));
+        index + 1
     }
 
     pub(crate) fn remove(&mut self, id: MaterialId) {
         if let Some((index, _)) = self.by_id.remove(&id) {
             self.free.push(index);
+            let lobes = self.table.get(index as usize).map_or(0, |record| record.lobes);
+            self.free_lobes.extend(lobes.checked_sub(1));
         }
         // A scene loaded afresh lies as in a new renderer.
         if self.by_id.is_empty() {
             self.table.clear();
             self.free.clear();
+            self.lobes.clear();
+            self.free_lobes.clear();
         }
     }
 
@@ -80,17 +116,27 @@ impl Materials {
         self.table.address()
     }
 
-    /// Records the copy of the table back to the host.
-    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<Download> {
-        self.table.download(recorder)
+    pub(crate) fn lobes_address(&self) -> u64 {
+        self.lobes.address()
+    }
+
+    pub(crate) fn sheen_albedo_address(&self) -> u64 {
+        self.sheen_albedo.address()
+    }
+
+    /// Records the copy of the tables of materials and of lobes back to the host.
+    pub(crate) fn download(&self, recorder: &mut Recorder) -> Result<(Download, Download)> {
+        Ok((self.table.download(recorder)?, self.lobes.download(recorder)?))
     }
 
     pub(crate) fn is_dirty(&self) -> bool {
-        self.table.is_dirty()
+        self.table.is_dirty() || self.lobes.is_dirty() || self.sheen_albedo.is_dirty()
     }
 
     pub(crate) fn flush(&mut self, recorder: &mut Recorder) -> Result<()> {
-        self.table.flush(recorder)
+        self.table.flush(recorder)?;
+        self.lobes.flush(recorder)?;
+        self.sheen_albedo.flush(recorder)
     }
 }
 
@@ -101,15 +147,18 @@ pub(crate) enum MaterialChange {
     Values,
     /// Its emitters shine differently.
     Emission,
-    /// Rays pass where they did not, faces are culled differently, or it began or ended to shine: the instances belong
-    /// elsewhere.
+    /// It began or ended to shine: its instances are emitters, or no longer.
+    Shine,
+    /// Rays pass where they did not, or faces are culled differently: its instances belong elsewhere, whether they shine or not.
     Kind,
 }
 
 fn change_between(old: &delta::Material, new: &delta::Material) -> MaterialChange {
-    let kind = |m: &delta::Material| (is_opaque(m), shows_both_sides(m), has_alpha(m), emits(m));
+    let kind = |m: &delta::Material| (is_opaque(m), shows_both_sides(m), has_alpha(m));
     if kind(old) != kind(new) {
         MaterialChange::Kind
+    } else if emits(old) != emits(new) {
+        MaterialChange::Shine
     } else if old.emissive != new.emissive {
         MaterialChange::Emission
     } else {
@@ -185,6 +234,7 @@ fn pack(material: &delta::Material, textures: &Textures) -> gpu_types::Material 
         },
         flags,
         medium_priority: u32::from(material.volume_priority),
+        lobes: 0,
         base_color_texture: texture(&material.base_color_texture),
         metallic_roughness_texture: texture(&material.metallic_roughness_texture),
         normal_texture: texture(&material.normal_texture),
@@ -207,7 +257,7 @@ fn attenuation_per_m(material: &delta::Material) -> Vec3 {
 
 /// KHR_texture_transform as one 2x2 matrix and an offset: uv' = T * R * S * uv with a counter-clockwise rotation in
 /// a space whose v points down, that is (u cos + v sin, -u sin + v cos).
-fn pack_texture(used: Option<&delta::TextureUse>, textures: &Textures) -> gpu_types::TextureUse {
+pub(super) fn pack_texture(used: Option<&delta::TextureUse>, textures: &Textures) -> gpu_types::TextureUse {
     let Some(used) = used else {
         return gpu_types::TextureUse {
             texture: NO_TEXTURE,

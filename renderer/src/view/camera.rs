@@ -3,7 +3,6 @@
 
 use glam::{Mat4, Vec2, Vec4};
 
-use crate::accumulation::Sample;
 use crate::delta::{Camera, Projection};
 use crate::gpu_types::Rows;
 use crate::tables::rows_of;
@@ -74,37 +73,6 @@ impl CameraMatrices {
     }
 }
 
-/// Where inside its pixel a sample lies, -0.5..0.5: Halton (2, 3), each stream turned by its own random shift
-/// (Cranley and Patterson 1976), so that the streams' errors are independent.
-pub(crate) fn jitter_px(sample: &Sample, seed: u32) -> Vec2 {
-    let within = (sample.index / 2) as u32;
-    let shift =
-        |axis: u32| hash(seed.wrapping_mul(0x9e37_79b9) ^ (sample.stream * 2 + axis)) as f32 * 2f32.powi(-32);
-    let turned = |value: f32, shift: f32| (value + shift).fract().clamp(0.0, 0.999_999_94) - 0.5;
-    Vec2::new(
-        turned(radical_inverse(within.wrapping_add(1), 2), shift(0)),
-        turned(radical_inverse(within.wrapping_add(1), 3), shift(1)),
-    )
-}
-
-/// Van der Corput sequence in a base, in 0..1.
-fn radical_inverse(mut index: u32, base: u32) -> f32 {
-    let (mut value, mut digit) = (0.0_f64, 1.0 / f64::from(base));
-    while index > 0 {
-        value += f64::from(index % base) * digit;
-        index /= base;
-        digit /= f64::from(base);
-    }
-    value as f32
-}
-
-/// PCG output permutation as a hash (Jarzynski and Olano 2020).
-fn hash(value: u32) -> u32 {
-    let state = value.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    (word >> 22) ^ word
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -143,17 +111,5 @@ mod tests {
         let pixels = |m: Mat4| (m.project_point3(point).truncate() * 0.5 + 0.5) * Vec2::new(200.0, 100.0);
         let moved = pixels(matrices.jittered(jitter, extent)) - pixels(matrices.clip_from_render);
         assert!((moved + jitter).abs().max_element() < 1e-4, "{moved}");
-    }
-
-    #[test]
-    fn jitter_fills_the_pixel_evenly() {
-        let mut cells = [0_u32; 16];
-        for i in 0..1024 {
-            let sample =
-                Sample { index: i * 2, stream: 0, block: 0, opens_block: false, closes_block: false };
-            let at = (jitter_px(&sample, 3) + 0.5) * 4.0;
-            cells[(at.y as usize).min(3) * 4 + (at.x as usize).min(3)] += 1;
-        }
-        assert!(cells.iter().all(|n| (56..=72).contains(n)), "{cells:?}");
     }
 }

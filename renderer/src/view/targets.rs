@@ -6,6 +6,7 @@ use caustica_gpu::{Device, Format, Image, ImageDesc, ImageUse};
 
 use crate::error::Result;
 use crate::needs::Needs;
+use crate::settings::Show;
 
 /// Images that the next frame reads as its past: two of each, taken in turns.
 pub(crate) struct History {
@@ -41,6 +42,10 @@ pub(crate) struct Targets {
     pub(crate) reflected_tint: Image,
     pub(crate) history: Option<History>,
     pub(crate) shaded: Image,
+    /// One texel that is bound and never written unless the number of rays is shown and rays are traced.
+    pub(crate) ray_depth: Image,
+    /// There while the shadow of a light is shown.
+    pub(crate) light_shadow: Option<Image>,
     pub(crate) display: Image,
     pub(crate) window: Option<Image>,
 }
@@ -57,17 +62,21 @@ impl Targets {
             let desc = ImageDesc { extent, format: Format::Depth32, mip_levels: 1, usage: ImageUse::Depth };
             Image::new(device, name, desc)
         };
+        let one_texel = |name: &str, format| {
+            let desc = ImageDesc { extent: [1, 1], format, mip_levels: 1, usage: ImageUse::Target };
+            Image::new(device, name, desc)
+        };
         let or_one_texel = |wanted: bool, name: &str, format| {
-            let extent = if wanted { extent } else { [1, 1] };
-            Image::new(device, name, ImageDesc { extent, format, mip_levels: 1, usage: ImageUse::Target })
+            if wanted { make(name, format) } else { one_texel(name, format) }
         };
         let pasts = if needs.temporal { 2 } else { 1 };
         let light = needs.direct_light();
         let denoises = needs.temporal && light;
         let brought = denoises && (needs.reflection || needs.refraction);
         let signal = |wanted: bool, name: &str| or_one_texel(wanted, name, Format::Rgba32Float);
-        let pair =
-            |wanted: bool, name: &str| -> Result<[Image; 2]> { Ok([signal(wanted, name)?, signal(wanted, name)?]) };
+        let pair = |wanted: bool, name: &str| -> Result<[Image; 2]> {
+            Ok([signal(wanted, name)?, signal(wanted, name)?])
+        };
         let filtered = || -> Result<[Image; 3]> {
             let wanted = needs.spatial;
             Ok([
@@ -97,14 +106,36 @@ impl Targets {
             material: make("gbuffer_material", Format::Rg16Float)?,
             motion: or_one_texel(needs.motion, "gbuffer_motion", Format::Rg32Float)?,
             emissive: optional(needs.emission, "gbuffer_emissive", Format::Rgba32Float)?,
-            direct_diffuse: optional(light && (denoises || !needs.paths), "direct_diffuse", Format::Rgba32Float)?,
+            direct_diffuse: optional(
+                light && (denoises || !needs.paths),
+                "direct_diffuse",
+                Format::Rgba32Float,
+            )?,
             direct_specular: optional(light && !needs.paths, "direct_specular", Format::Rgba32Float)?,
             reflected: signal(brought, "reflected")?,
-            reflected_tint: or_one_texel(brought || (denoises && needs.paths), "reflected_tint", Format::Rgba16Float)?,
+            reflected_tint: or_one_texel(
+                brought || (denoises && needs.paths),
+                "reflected_tint",
+                Format::Rgba16Float,
+            )?,
             history: history.transpose()?,
             shaded: make("shaded", Format::Rgba32Float)?,
+            ray_depth: or_one_texel(needs.ray_depth && needs.secondary_rays(), "ray_depth", Format::R32Uint)?,
+            light_shadow: None,
             display: make("display", Format::Rgba16Float)?,
             window: optional(window, "window", Format::Rgba16Float)?,
         })
+    }
+
+    /// Makes what is shown and needed for nothing else, and lets go what is not shown any more.
+    pub(crate) fn prepare_shown(&mut self, device: &Arc<Device>, extent: [u32; 2], show: Show) -> Result<()> {
+        if show != Show::Shadow {
+            self.light_shadow = None;
+        } else if self.light_shadow.is_none() {
+            let format = Format::Rgba32Float;
+            let desc = ImageDesc { extent, format, mip_levels: 1, usage: ImageUse::Target };
+            self.light_shadow = Some(Image::new(device, "light_shadow", desc)?);
+        }
+        Ok(())
     }
 }

@@ -47,17 +47,48 @@ vec3 show_float(Frame frame, vec4 value) {
     }
 }
 
-vec3 show_uint(uvec4 value) {
-    bool is_id = push.argument0 == SHOW_INSTANCE || push.argument0 == SHOW_MATERIAL || push.argument0 == SHOW_TRIANGLE;
-    if (is_id ? value.x == 0u : (value.x | value.y) == 0u) {
+// Blue in front, red behind.
+vec3 facing_color(bool front) {
+    return front ? vec3(0.05, 0.2, 0.7) : vec3(0.7, 0.08, 0.05);
+}
+
+// One ray is the beginning of the ramp, the greatest depth its end.
+vec3 depth_color(uint rays, uint max_depth) {
+    return rays == 0u ? vec3(0.0) : ramp_color(float(rays - 1u) / float(max(max_depth, 2u) - 1u));
+}
+
+vec3 show_uint(Frame frame, uvec4 value) {
+    switch (push.argument0) {
+        case SHOW_NORMAL:
+        case SHOW_GEOMETRIC_NORMAL:
+            return (value.x | value.y) == 0u ? vec3(0.0) : normal_color(push.argument0 == SHOW_NORMAL ? value.x : value.y);
+        case SHOW_RAY_DEPTH: return depth_color(value.x, frame.max_depth);
+        default: break;
+    }
+    if (value.x == 0u) {
         return vec3(0.0); // background
     }
+    uint primitive = hash_combine(value.x, value.y & ~GBUFFER_BACK);
     switch (push.argument0) {
-        case SHOW_NORMAL: return normal_color(value.x);
-        case SHOW_GEOMETRIC_NORMAL: return normal_color(value.y);
         case SHOW_INSTANCE: return id_color(value.x);
+        case SHOW_PRIMITIVE: return id_color(primitive);
         case SHOW_MATERIAL: return id_color(value.w);
-        default: return id_color(hash_combine(hash_combine(value.x, value.y & 0x7fffffffu), value.z));
+        case SHOW_FACING: return facing_color((value.y & GBUFFER_BACK) == 0u);
+        default: return id_color(hash_combine(primitive, value.z));
+    }
+}
+
+bool reads_uint() {
+    switch (push.argument0) {
+        case SHOW_NORMAL:
+        case SHOW_GEOMETRIC_NORMAL:
+        case SHOW_INSTANCE:
+        case SHOW_PRIMITIVE:
+        case SHOW_MATERIAL:
+        case SHOW_TRIANGLE:
+        case SHOW_FACING:
+        case SHOW_RAY_DEPTH: return true;
+        default: return false;
     }
 }
 
@@ -69,17 +100,9 @@ void main() {
     }
     ivec2 at = ivec2(pixel);
     vec3 color = vec3(0.0);
-    switch (push.argument0) {
-        case SHOW_NORMAL:
-        case SHOW_GEOMETRIC_NORMAL:
-        case SHOW_INSTANCE:
-        case SHOW_MATERIAL:
-        case SHOW_TRIANGLE: color = show_uint(texelFetch(source_uint, at, 0)); break;
-        default: // a target that was left out is stood in for by one texel: what does not exist is black
-            if (textureSize(source, 0) == ivec2(frame.extent_px)) {
-                color = show_float(frame, texelFetch(source, at, 0));
-            }
-            break;
+    // A target that was left out is stood in for by one texel: what does not exist is black.
+    if ((reads_uint() ? textureSize(source_uint, 0) : textureSize(source, 0)) == ivec2(frame.extent_px)) {
+        color = reads_uint() ? show_uint(frame, texelFetch(source_uint, at, 0)) : show_float(frame, texelFetch(source, at, 0));
     }
     imageStore(display, at, vec4(is_finite(color) ? clamp(color, 0.0, 1.0) : vec3(1.0, 0.0, 1.0), 1.0));
 }

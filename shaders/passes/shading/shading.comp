@@ -17,7 +17,7 @@ vec3 environment_lobe(Scene scene, Surface surface, uint material, Sequence sequ
     Interface crossing = surface_interface(scene, surface, material, media_outside());
     uint branch = reflects ? 0u : 1u;
     vec2 xi = sample_2d(sequence, sample_dimension(0u, branch, PURPOSE_LOBE, 0u));
-    Scatter scatter = scatter_surface(surface, interface_sides(scene, crossing), reflects, !reflects, vec3(0.0, xi));
+    Scatter scatter = scatter_surface(surface, interface_sides(scene, crossing, DISPERSION_NO_CHANNEL), reflects, !reflects, vec3(0.0, xi));
     return scatter.valid ? scatter.weight * environment_radiance(scene, scatter.direction) : vec3(0.0);
 }
 

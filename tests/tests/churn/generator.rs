@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use caustica::session::Session;
 use caustica_scene::import::Imported;
 use caustica_scene::{
-    AlphaMode, ClipChoice, Document, Edit, EditError, Environment, Light, LightKind, Local, Material,
-    MaterialEntry, MaterialId, MeshId, Node, NodeId, NodeKind, OverrideField, PrefabId, ShadingMode, Target,
-    TextureUse, Trs,
+    AlphaMode, Clearcoat, ClipChoice, Document, Edit, EditError, Environment, Light, LightKind, Local,
+    Material, MaterialEntry, MaterialId, MeshId, Node, NodeId, NodeKind, OverrideField, PrefabId,
+    ShadingMode, Target, TextureUse, Trs,
 };
 use caustica_tests::numbers::Random;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3, Vec4};
@@ -374,10 +374,10 @@ impl Churn {
         self.pick(&materials)
     }
 
-    /// Changes what makes most work: whether light passes, whether it shines, which sides are seen, its texture.
+    /// Changes what makes most work: whether light passes, whether it shines, which sides are seen, its texture, whether it has lobes.
     fn material_value(&mut self, document: &Document, old: Material) -> Material {
         let color = self.color();
-        match self.below(9) {
+        match self.below(10) {
             0 => Material { alpha: AlphaMode::Mask { cutoff: 0.5 }, ..old },
             1 => Material { alpha: AlphaMode::Opaque, ..old },
             2 => Material { emissive: color, emissive_strength: self.between(0.5, 3.0) as f32, ..old },
@@ -397,6 +397,10 @@ impl Churn {
                     scale: Vec2::ONE,
                 });
                 Material { base_color_texture: used.filter(|_| self.below(2) == 0), ..old }
+            }
+            7 => {
+                let coat = Clearcoat { factor: 0.5, roughness: 0.5, ..Clearcoat::default() };
+                Material { clearcoat: Some(coat).filter(|_| self.below(2) == 0), ..old }
             }
             _ => {
                 let roughness = self.between(0.0, 1.0) as f32;

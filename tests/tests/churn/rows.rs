@@ -6,7 +6,8 @@ use std::collections::BTreeSet;
 use caustica::session::{Session, ViewCamera};
 use caustica_renderer::{AccelPolicy, NeedsMode, Pipeline, Show, TlasWork, ToneMap, ViewSettings};
 use caustica_scene::{
-    ClipChoice, Document, Edit, Environment, Light, Local, Material, NodeId, NodeKind, Target, Trs,
+    ClipChoice, Document, Edit, Environment, Light, Local, Material, MaterialId, NodeId, NodeKind, Target,
+    Trs,
 };
 use caustica_tests::gpu;
 use glam::{DVec3, Vec3};
@@ -230,6 +231,37 @@ fn materials_lights_and_surroundings_cost_their_records(bench: &mut Bench) {
     assert_eq!((cost.blas, cost.new_blas, cost.tlas), (2, 1, bench.refit));
 }
 
+fn material_named(bench: &Bench, name: &str) -> (MaterialId, Material) {
+    let mut all = bench.session.document().materials();
+    all.find(|(_, value)| value.name == name).map(|(id, value)| (id, value.clone())).expect("a material")
+}
+
+fn a_material_that_is_given_builds_a_tree_only_where_rays_pass(bench: &mut Bench) {
+    let target = Target::node(bench.named("Floor"));
+    let give = |bench: &mut Bench, name: &str| {
+        let material = material_named(bench, name).0;
+        bench.edit(Edit::AssignMaterial { target, primitive: 0, material })
+    };
+    let cost = give(bench, "Skin");
+    bench.assert_reset(cost, bench.refit, FEW_BYTES, "gave Skin to Floor");
+    // The floor leaves the tree that it shares with the plate; no instance has come, gone or moved.
+    let cost = give(bench, "Glass");
+    assert_eq!((cost.blas, cost.new_blas, cost.tlas, cost.samples), (1, 1, bench.refit, 1));
+    let cost = give(bench, "Lace");
+    bench.assert_reset(cost, bench.refit, FEW_BYTES, "gave Lace to Floor");
+    let cost = give(bench, "Paint");
+    bench.assert_reset(cost, bench.refit, FEW_BYTES, "gave Paint to Floor");
+}
+
+fn a_material_that_begins_to_shine_touches_no_tree(bench: &mut Bench) {
+    let (material, dark) = material_named(bench, "Paint");
+    let value = Box::new(Material { emissive: Vec3::splat(2.0), ..dark });
+    let cost = bench.edit(Edit::SetMaterial { material, value });
+    bench.assert_reset(cost, TlasWork::Kept, FEW_BYTES, "changed Paint");
+    let cost = bench.after(|session| _ = session.undo());
+    bench.assert_reset(cost, TlasWork::Kept, FEW_BYTES, "changed Paint");
+}
+
 fn a_time_step_costs_what_the_clip_moves_and_bends(bench: &mut Bench) {
     for time_s in [0.25, 0.5, 0.75] {
         let cost = bench.after(|session| session.set_time(Some(time_s)));
@@ -352,6 +384,8 @@ fn each_event_costs_what_the_table_says() {
         a_primitive_a_weight_and_a_joint_cost_the_trees_that_they_bend,
         an_instance_builds_what_it_does_not_share_and_its_end_builds_nothing,
         materials_lights_and_surroundings_cost_their_records,
+        a_material_that_is_given_builds_a_tree_only_where_rays_pass,
+        a_material_that_begins_to_shine_touches_no_tree,
         a_time_step_costs_what_the_clip_moves_and_bends,
         what_is_no_event_keeps_the_samples,
         views_cost_no_structure,

@@ -73,6 +73,17 @@ fn rough_coats_and_rough_glass_make_no_light() {
     }
 }
 
+#[test]
+fn rough_metal_loses_nothing_when_repeated_scattering_counts() {
+    let mut furnace = Furnace::new();
+    furnace.0.set(|settings| settings.multiple_scattering = true);
+    for roughness in [0.0, 0.15, 0.4, 0.7, 1.0] {
+        let metal = Material { metallic: 1.0, roughness, ..Material::default() };
+        let (mean, error) = furnace.with(&format!("roughness {roughness}"), metal, 32);
+        assert!((mean - 1.0).abs() < 4.0 * error + 2e-3, "roughness {roughness}: {mean} +- {error}");
+    }
+}
+
 /// A closed white box with a small lamp: between walls that reflect 0.8 of the light, radiance is the geometric series.
 #[test]
 fn paths_between_walls_are_as_long_as_they_need_to_be() {

@@ -1,22 +1,24 @@
-//! Row 13: random numbers. The naive forms: a seed that adds pixel and frame, a frame index held in a float, the odd and
-//! even samples of one sequence as two streams.
+//! Row 13: random numbers of the default sampler. The naive forms: a seed that adds pixel and frame, a frame index held in
+//! a float.
 
 use caustica_tests::compute::{Snippet, run};
 use caustica_tests::gpu::session;
-use caustica_tests::numbers::{chi_square_deviate, correlation, star_discrepancy};
+use caustica_tests::numbers::{chi_square_deviate, correlation};
 
 const INCLUDES: &[&str] = &["lib/random.glsl"];
 
-fn column(values: &[f32], width: usize, at: usize) -> Vec<f64> {
+/// One value of every invocation.
+pub fn column(values: &[f32], width: usize, at: usize) -> Vec<f64> {
     values.chunks_exact(width).map(|row| f64::from(row[at])).collect()
 }
 
-fn pairs(values: &[f32], width: usize, at: usize) -> Vec<[f64; 2]> {
+/// Two values of every invocation, as a point.
+pub fn pairs(values: &[f32], width: usize, at: usize) -> Vec<[f64; 2]> {
     values.chunks_exact(width).map(|row| [f64::from(row[at]), f64::from(row[at + 1])]).collect()
 }
 
 /// Whether every box of every shape with area 1 / n holds one of these n points: a (0, m, 2)-net in base 2.
-fn is_net(points: &[[f64; 2]]) -> bool {
+pub fn is_net(points: &[[f64; 2]]) -> bool {
     let bits = points.len().trailing_zeros();
     (0..=bits).all(|i| {
         let (wide, high) = (1_usize << i, 1_usize << (bits - i));
@@ -65,21 +67,6 @@ fn every_run_of_samples_is_a_net() {
             assert!(r.abs() < bound, "column {axis} and {}: {r}", other + axis);
         }
     }
-}
-
-#[test]
-fn points_cover_the_square_better_than_hashed_numbers() {
-    let mut session = session();
-    let body = "
-        vec2 ours = sample_2d(sequence_begin(1u, uvec2(11u, 2u), uint64_t(index) * 2ul), 0u);
-        uvec4 h = hash_pcg4d(uvec4(index, 11u, 2u, 0u));
-        write(0u, ours.x); write(1u, ours.y); write(2u, unit_float(h.x)); write(3u, unit_float(h.y));";
-    let values =
-        run(&mut session, &Snippet { includes: INCLUDES, body, values: 4, count: 256, ..Snippet::default() });
-    let ours = star_discrepancy(&pairs(&values, 4, 0));
-    let hashed = star_discrepancy(&pairs(&values, 4, 2));
-    assert!(ours < 0.02, "{ours}");
-    assert!(hashed > 2.0 * ours, "hashed {hashed}, ours {ours}");
 }
 
 #[test]
@@ -149,49 +136,4 @@ fn late_samples_still_differ() {
     };
     assert_eq!(distinct(0), 64);
     assert!(distinct(1) <= 24, "the naive index is expected to repeat: {}", distinct(1));
-}
-
-#[test]
-fn the_two_streams_err_independently() {
-    const SAMPLES: u32 = 16;
-    const PIXELS: usize = 4096;
-    let mut session = session();
-    // Error of the mean of a smooth integrand in both streams, and in the even and odd samples of one sequence.
-    let functions = "float integrand(vec2 x) { return exp(x.x) * (1.0 + x.y * x.y); }";
-    let body = "
-        uvec2 pixel = uvec2(index % 64u, index / 64u);
-        vec4 sums = vec4(0.0);
-        for (uint i = 0u; i < 16u; ++i) {
-            sums.x += integrand(sample_2d(sequence_begin(3u, pixel, uint64_t(i) * 2ul), 4u));
-            sums.y += integrand(sample_2d(sequence_begin(3u, pixel, uint64_t(i) * 2ul + 1ul), 4u));
-            sums.z += integrand(sample_2d(sequence_begin(3u, pixel, uint64_t(2u * i) * 2ul), 4u));
-            sums.w += integrand(sample_2d(sequence_begin(3u, pixel, uint64_t(2u * i + 1u) * 2ul), 4u));
-        }
-        for (uint k = 0u; k < 4u; ++k) {
-            write(k, sums[k]);
-        }";
-    let values = run(
-        &mut session,
-        &Snippet { includes: INCLUDES, functions, body, values: 4, count: PIXELS, ..Snippet::default() },
-    );
-    let mean = (std::f64::consts::E - 1.0) * (4.0 / 3.0);
-    let errors = |at: usize| -> Vec<f64> {
-        column(&values, 4, at).iter().map(|sum| sum / f64::from(SAMPLES) - mean).collect()
-    };
-    let [a, b, even, odd] = [0, 1, 2, 3].map(errors);
-    let deviation = |e: &[f64]| (e.iter().map(|x| x * x).sum::<f64>() / e.len() as f64).sqrt();
-    let bias = |e: &[f64]| e.iter().sum::<f64>() / e.len() as f64;
-    for errors in [&a, &b] {
-        let allowed = 5.0 * deviation(errors) / (PIXELS as f64).sqrt();
-        assert!(bias(errors).abs() < allowed.max(1e-5), "bias {} of {allowed}", bias(errors));
-    }
-    let r = correlation(&a, &b);
-    assert!(r.abs() < 5.0 / (PIXELS as f64).sqrt(), "{r}");
-    // So the half difference estimates the error of the mean.
-    let pairs = a.iter().zip(&b);
-    let (half, full): (Vec<f64>, Vec<f64>) = pairs.map(|(a, b)| (0.5 * (a - b), 0.5 * (a + b))).unzip();
-    let ratio = deviation(&half) / deviation(&full);
-    assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
-    let r = correlation(&even, &odd);
-    assert!(r.abs() > 0.2, "odd and even samples of one sequence are expected to be correlated: {r}");
 }

@@ -23,6 +23,7 @@ pub(super) const SURFACE: &str = "
         s.occlusion = 1.0;
         s.emissive = vec3(0.0);
         s.mode = mode;
+        s.lobes = LOBES_NONE;
         s.front = front;
         s.flags = flags;
         return s;

@@ -4,6 +4,7 @@
 use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
+use super::lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, SpecularGlossiness};
 use super::texture::TextureUse;
 
 /// How a surface answers light.
@@ -73,12 +74,22 @@ pub struct Material {
     pub ior: f32,
     /// Strength of the dielectric specular lobe, 0..1 (KHR_materials_specular).
     pub specular: f32,
+    /// Alpha: strength.
+    pub specular_texture: Option<TextureUse>,
     /// Tint of the dielectric F0 (KHR_materials_specular).
     pub specular_color: Vec3,
+    /// Tint (sRGB).
+    pub specular_color_texture: Option<TextureUse>,
     /// Share of transmitted light, 0..1 (KHR_materials_transmission).
     pub transmission: f32,
+    /// Red: share.
+    pub transmission_texture: Option<TextureUse>,
     /// True when light crosses a volume (KHR_materials_volume, thickness above 0); false: a thin sheet.
     pub has_volume: bool,
+    /// Thickness in mesh space for programs that trace no rays; kept for them, not looked at here.
+    pub thickness_m: f32,
+    /// Green: thickness; kept likewise.
+    pub thickness_texture: Option<TextureUse>,
     /// Where volumes overlap, the one with the higher number is there (Schmidt and Budge 2002); equal: the one entered
     /// last. glTF has no place for it: `extras.volumePriority` of the material.
     pub volume_priority: u8,
@@ -86,6 +97,26 @@ pub struct Material {
     pub attenuation_color: Vec3,
     /// Distance of the above in metres; `None`: no attenuation.
     pub attenuation_distance_m: Option<f32>,
+    /// How the index of refraction depends on the colour: 20 / Abbe number, at least 0 (KHR_materials_dispersion).
+    pub dispersion: f32,
+    /// Brushed surfaces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anisotropy: Option<Anisotropy>,
+    /// A clear layer over everything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearcoat: Option<Clearcoat>,
+    /// A thin film.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iridescence: Option<Iridescence>,
+    /// Cloth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sheen: Option<Sheen>,
+    /// Leaves and paper.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse_transmission: Option<DiffuseTransmission>,
+    /// Reflectance and glossiness in place of metalness and roughness.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specular_glossiness: Option<SpecularGlossiness>,
     /// Alpha mode.
     pub alpha: AlphaMode,
     /// Whether the back of a triangle is drawn.
@@ -111,12 +142,24 @@ impl Default for Material {
             emissive_texture: None,
             ior: 1.5,
             specular: 1.0,
+            specular_texture: None,
             specular_color: Vec3::ONE,
+            specular_color_texture: None,
             transmission: 0.0,
+            transmission_texture: None,
             has_volume: false,
+            thickness_m: 0.0,
+            thickness_texture: None,
             volume_priority: 0,
             attenuation_color: Vec3::ONE,
             attenuation_distance_m: None,
+            dispersion: 0.0,
+            anisotropy: None,
+            clearcoat: None,
+            iridescence: None,
+            sheen: None,
+            diffuse_transmission: None,
+            specular_glossiness: None,
             alpha: AlphaMode::Opaque,
             double_sided: false,
         }
@@ -131,28 +174,57 @@ impl Material {
 
     /// Every texture that the material uses.
     pub fn textures(&self) -> impl Iterator<Item = &TextureUse> {
-        [
+        let own = [
             &self.base_color_texture,
             &self.metallic_roughness_texture,
             &self.normal_texture,
             &self.occlusion_texture,
             &self.emissive_texture,
-        ]
-        .into_iter()
-        .flatten()
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+            &self.thickness_texture,
+        ];
+        own.into_iter()
+            .chain(self.anisotropy.iter().flat_map(Anisotropy::slots))
+            .chain(self.clearcoat.iter().flat_map(Clearcoat::slots))
+            .chain(self.iridescence.iter().flat_map(Iridescence::slots))
+            .chain(self.sheen.iter().flat_map(Sheen::slots))
+            .chain(self.diffuse_transmission.iter().flat_map(DiffuseTransmission::slots))
+            .chain(self.specular_glossiness.iter().flat_map(SpecularGlossiness::slots))
+            .flatten()
     }
 
-    /// Every texture that the material uses, to change its id.
-    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureUse> {
-        [
+    /// Every place for a texture, to change it or take it off.
+    pub fn texture_slots_mut(&mut self) -> impl Iterator<Item = &mut Option<TextureUse>> {
+        let own = [
             &mut self.base_color_texture,
             &mut self.metallic_roughness_texture,
             &mut self.normal_texture,
             &mut self.occlusion_texture,
             &mut self.emissive_texture,
-        ]
-        .into_iter()
-        .flatten()
+            &mut self.specular_texture,
+            &mut self.specular_color_texture,
+            &mut self.transmission_texture,
+            &mut self.thickness_texture,
+        ];
+        own.into_iter()
+            .chain(self.anisotropy.iter_mut().flat_map(Anisotropy::slots_mut))
+            .chain(self.clearcoat.iter_mut().flat_map(Clearcoat::slots_mut))
+            .chain(self.iridescence.iter_mut().flat_map(Iridescence::slots_mut))
+            .chain(self.sheen.iter_mut().flat_map(Sheen::slots_mut))
+            .chain(self.diffuse_transmission.iter_mut().flat_map(DiffuseTransmission::slots_mut))
+            .chain(self.specular_glossiness.iter_mut().flat_map(SpecularGlossiness::slots_mut))
+    }
+
+    /// Whether a lobe scatters light that the smooth glass of [`ShadingMode::Refractive`] does not know.
+    pub fn has_scattering_lobe(&self) -> bool {
+        self.anisotropy.is_some()
+            || self.clearcoat.is_some()
+            || self.iridescence.is_some()
+            || self.sheen.is_some()
+            || self.diffuse_transmission.is_some()
+            || self.specular_glossiness.is_some()
     }
 
     /// Whether every number is finite.
@@ -170,6 +242,10 @@ impl Material {
             && self.specular_color.is_finite()
             && self.attenuation_color.is_finite()
             && self.attenuation_distance_m.is_none_or(f32::is_finite)
+            && self.sheen.as_ref().is_none_or(|lobe| lobe.color.is_finite())
+            && self.diffuse_transmission.as_ref().is_none_or(|lobe| lobe.color.is_finite())
+            && self.specular_glossiness.as_ref().is_none_or(|lobe| lobe.specular.is_finite())
+            && self.lobe_numbers().all(f32::is_finite)
             && [
                 self.metallic,
                 self.roughness,
@@ -179,9 +255,27 @@ impl Material {
                 self.ior,
                 self.specular,
                 self.transmission,
+                self.thickness_m,
+                self.dispersion,
                 cutoff,
             ]
             .iter()
             .all(|v| v.is_finite())
+    }
+
+    fn lobe_numbers(&self) -> impl Iterator<Item = f32> {
+        let anisotropy = self.anisotropy.iter().flat_map(|lobe| vec![lobe.strength, lobe.rotation_rad]);
+        let clearcoat =
+            self.clearcoat.iter().flat_map(|lobe| vec![lobe.factor, lobe.roughness, lobe.normal_scale]);
+        let iridescence = self
+            .iridescence
+            .iter()
+            .flat_map(|lobe| vec![lobe.factor, lobe.ior, lobe.thickness_min_nm, lobe.thickness_max_nm]);
+        anisotropy
+            .chain(clearcoat)
+            .chain(iridescence)
+            .chain(self.sheen.iter().map(|lobe| lobe.roughness))
+            .chain(self.diffuse_transmission.iter().map(|lobe| lobe.factor))
+            .chain(self.specular_glossiness.iter().map(|lobe| lobe.glossiness))
     }
 }

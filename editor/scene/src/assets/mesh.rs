@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
-use super::deform::{DeformPose, MorphTarget, Reach, SkinData, join};
+use super::deform::{Bounds, DeformPose, MorphTarget, Reach, SkinData, join, moved};
 use crate::ids::MaterialId;
 
 /// Vertices and indices. All arrays but `tex_coords1` and `colors` hold one entry a vertex; those two
@@ -43,10 +43,13 @@ pub struct Mesh {
     pub data: Arc<MeshData>,
     /// Ranges of the indices.
     pub primitives: Vec<Primitive>,
-    /// Smallest and largest corner in mesh space, primitive transforms included; `None` without triangles.
+    /// Smallest and largest corner in mesh space, primitive transforms included; `None` without triangles. They are those of
+    /// the boxes of the primitives: never too small, and too large where one is turned.
     pub bounds: Option<(DVec3, DVec3)>,
     /// Weights of the morph targets unless a node, part or clip says otherwise, one a target.
     pub default_weights: Vec<f32>,
+    /// One a primitive, primitive space.
+    own_bounds: Vec<Option<Bounds>>,
     /// One a primitive; empty for a mesh that nothing bends.
     reach: Vec<Reach>,
 }
@@ -68,7 +71,9 @@ impl Mesh {
     /// A mesh with its bounds computed; its morph targets have weight 0.
     pub fn new(name: String, data: Arc<MeshData>, primitives: Vec<Primitive>) -> Self {
         let default_weights = vec![0.0; data.morph.len()];
-        let mut mesh = Self { name, data, primitives, bounds: None, default_weights, reach: Vec::new() };
+        let (own_bounds, reach) = (Vec::new(), Vec::new());
+        let mut mesh = Self { name, data, primitives, bounds: None, default_weights, own_bounds, reach };
+        mesh.own_bounds = mesh.primitives.iter().map(|primitive| mesh.corners_of(primitive)).collect();
         mesh.update_bounds();
         if mesh.data.skin.is_some() || !mesh.data.morph.is_empty() {
             let reach = |primitive| Reach::of(&mesh.data, mesh.indices_of(primitive));
@@ -77,10 +82,12 @@ impl Mesh {
         mesh
     }
 
-    /// Computes `bounds` again, as after a primitive moved.
+    /// Computes `bounds` again, as after a primitive moved. Costs the primitives, not the vertices.
     pub fn update_bounds(&mut self) {
-        self.bounds =
-            self.primitives.iter().filter_map(|primitive| self.primitive_bounds(primitive)).reduce(join);
+        let placed = |(own, primitive): (&Option<Bounds>, &Primitive)| {
+            own.map(|own| moved(&primitive.mesh_from_primitive, own))
+        };
+        self.bounds = self.own_bounds.iter().zip(&self.primitives).filter_map(placed).reduce(join);
     }
 
     /// Smallest and largest corner in a pose, mesh space: never too small, perhaps too large. Costs the joints
@@ -90,16 +97,14 @@ impl Mesh {
         self.reach.iter().zip(&self.primitives).filter_map(posed).reduce(join)
     }
 
-    /// Smallest and largest corner of one primitive, mesh space.
-    pub fn primitive_bounds(&self, primitive: &Primitive) -> Option<(DVec3, DVec3)> {
-        self.indices_of(primitive)
-            .iter()
-            .filter_map(|&index| self.data.positions.get(index as usize))
-            .map(|p| primitive.mesh_from_primitive.transform_point3(p.as_dvec3()))
-            .fold(None, |bounds, p| match bounds {
-                None => Some((p, p)),
-                Some((low, high)) => Some((p.min(low), p.max(high))),
-            })
+    /// Smallest and largest corner of one primitive, primitive space; `None` without triangles.
+    pub fn primitive_bounds(&self, primitive: usize) -> Option<(DVec3, DVec3)> {
+        self.own_bounds.get(primitive).copied().flatten()
+    }
+
+    fn corners_of(&self, primitive: &Primitive) -> Option<Bounds> {
+        let corner = |&index: &u32| self.data.positions.get(index as usize).map(|p| p.as_dvec3());
+        self.indices_of(primitive).iter().filter_map(corner).map(|p| (p, p)).reduce(join)
     }
 
     /// The indices of one primitive; empty when its range lies outside the mesh.

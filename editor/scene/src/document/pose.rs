@@ -30,6 +30,19 @@ struct Moved {
     scale: Option<DVec3>,
 }
 
+/// What of a target a clip sets at the time that is shown: there the document's own value waits for the rest pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Driven {
+    /// Translation against the parent.
+    pub translation: bool,
+    /// Rotation against the parent.
+    pub rotation: bool,
+    /// Scale along the own axes.
+    pub scale: bool,
+    /// Weights of the morph targets.
+    pub weights: bool,
+}
+
 impl Pose {
     /// The chosen clips at a time.
     fn at(prefab: &Prefab, choice: ClipChoice, time_s: f64) -> Self {
@@ -143,6 +156,19 @@ impl Document {
         match target.part {
             None => self.node(target.node).map(|node| node.local),
             Some(part) => Some(self.slots.get(&target.node)?.parts.posed_local(part, self.part(target)?)),
+        }
+    }
+
+    /// What of a target a clip sets at the time that is shown; nothing at rest.
+    pub fn driven(&self, target: Target) -> Driven {
+        let pose = self.slots.get(&target.node).map(|slot| &slot.parts.pose);
+        let Some((pose, part)) = pose.zip(target.part) else { return Driven::default() };
+        let moved = pose.moved.get(&part).copied().unwrap_or_default();
+        Driven {
+            translation: moved.translation.is_some(),
+            rotation: moved.rotation.is_some(),
+            scale: moved.scale.is_some(),
+            weights: pose.weights.contains_key(&part),
         }
     }
 

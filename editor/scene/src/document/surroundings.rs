@@ -16,8 +16,10 @@ pub(super) struct Surroundings {
     lights: BTreeSet<Target>,
     /// Placed meshes with a material that shines, hidden ones too.
     shining: BTreeSet<Target>,
-    /// A material started or stopped to shine: `shining` has to be made anew.
+    /// A material started or stopped to shine: `shining` has to be made anew, which walks the scene, before it is asked.
     stale: bool,
+    /// The same since the last drain.
+    shine_changed: bool,
     /// What the last drain told of; `None` while the environment is not [`Environment::Auto`].
     reported: Option<Environment>,
 }
@@ -37,7 +39,9 @@ impl Surroundings {
 
     /// Some material may shine now that did not, or the other way round.
     pub fn note_material(&mut self, before: Option<&Material>, after: Option<&Material>) {
-        self.stale |= before.is_some_and(shines) != after.is_some_and(shines);
+        let changed = before.is_some_and(shines) != after.is_some_and(shines);
+        self.stale |= changed;
+        self.shine_changed |= changed;
     }
 }
 
@@ -122,13 +126,18 @@ impl Document {
     /// Whether the effective environment is another than at the last drain. `may_differ` says that something
     /// came, went, was hidden or shown since.
     pub(super) fn environment_differs(&mut self, may_differ: bool) -> bool {
-        let stale = std::mem::take(&mut self.surroundings.stale);
-        if stale {
+        let may_differ = std::mem::take(&mut self.surroundings.shine_changed) || may_differ;
+        if self.environment != Environment::Auto || !may_differ {
+            return false;
+        }
+        // A wish or a lamp decides alone, whatever shines besides.
+        if self.surroundings.stale
+            && self.surroundings.wishes.is_empty()
+            && self.surroundings.lights.is_empty()
+        {
             let all = self.targets_with(|content| content.mesh);
             self.surroundings.shining = all.filter(|&target| self.shines(target)).collect();
-        }
-        if self.environment != Environment::Auto || !(stale || may_differ) {
-            return false;
+            self.surroundings.stale = false;
         }
         let now = Some(self.effective_environment());
         let differs = self.surroundings.reported != now;

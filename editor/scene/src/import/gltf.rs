@@ -54,7 +54,7 @@ fn read(
     let accessors = accessor::Accessors::read(&root, &buffers, &views)?;
     progress("reading meshes", 0.2);
     let mut textures = texture::TextureTable::read(&root)?;
-    let mut materials = material::read_all(&root, &mut textures)?;
+    let (mut materials, material_warnings) = material::read_all(&root, &mut textures)?;
     let meshes = mesh::read_all(&root, &accessors, &materials, options.max_elements)?;
     if meshes.uses_default_material {
         materials.push(Material { name: "default".to_owned(), ..Material::default() });
@@ -72,6 +72,7 @@ fn read(
     prefab.set_nodes(tree.parts).map_err(|error| Fault::new("/nodes", error.to_string()))?;
     let faults = left_out_warnings(&root, &left_out)?
         .into_iter()
+        .chain(material_warnings)
         .chain(meshes.warnings)
         .chain(tree.warnings)
         .chain(image_warnings);

@@ -134,13 +134,7 @@ impl Loader<'_> {
 
     fn without_lost_textures(&mut self, mut material: Material) -> Material {
         let mut lost = Vec::new();
-        for slot in [
-            &mut material.base_color_texture,
-            &mut material.metallic_roughness_texture,
-            &mut material.normal_texture,
-            &mut material.occlusion_texture,
-            &mut material.emissive_texture,
-        ] {
+        for slot in material.texture_slots_mut() {
             let gone = slot.filter(|u| self.document.texture(u.texture).is_none());
             if let Some(gone) = gone {
                 lost.push(gone.texture.0.to_string());

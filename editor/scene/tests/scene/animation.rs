@@ -5,8 +5,8 @@ use std::path::Path;
 
 use caustica_scene::import::{ImportOptions, load};
 use caustica_scene::{
-    Animation, Channel, ChannelPath, ClipChoice, DeformPose, Document, Edit, EditError, Interpolation, Local,
-    Node, NodeId, NodeKind, OverrideField, Project, ProjectMeta, Target, Trs,
+    Animation, Channel, ChannelPath, ClipChoice, DeformPose, Document, Driven, Edit, EditError,
+    Interpolation, Local, Node, NodeId, NodeKind, OverrideField, Project, ProjectMeta, Target, Trs,
 };
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 
@@ -286,6 +286,17 @@ fn edits_and_their_undo_go_on_below_the_pose() {
     document.apply(redo_arm).unwrap();
     document.set_time(None);
     assert_eq!(document.posed_local(arm), Some(moved));
+}
+
+#[test]
+fn a_clip_drives_what_its_channels_name_while_a_time_is_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = animated(folder.path());
+    let (first, arm) = (scene.first, scene.part(ARM));
+    assert_eq!(scene.document.driven(arm), Driven::default());
+    scene.document.set_time(Some(0.0));
+    assert_eq!(scene.document.driven(arm), Driven { rotation: true, ..Driven::default() });
+    assert_eq!(scene.document.driven(first.into()), Driven::default());
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod common;
 mod edits;
 mod gltf_file;
 mod import;
+mod lobes;
 mod oracle;
 mod projects;
 mod rig_damage;

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use caustica_scene::import::Imported;
 use caustica_scene::{
-    Animation, Channel, ChannelPath, Document, Edit, Interpolation, Local, Material, MaterialId, Mesh,
-    MeshData, MeshId, Node, NodeId, NodeKind, PartNode, Prefab, Primitive, Skin, SkinData, Subtree, Target,
-    Trs,
+    Animation, Channel, ChannelPath, Document, Edit, Environment, Interpolation, Light, LightKind, Local,
+    Material, MaterialId, Mesh, MeshData, MeshId, Node, NodeId, NodeKind, PartNode, Prefab, Primitive, Skin,
+    SkinData, Subtree, Target, Trs,
 };
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
@@ -175,7 +175,7 @@ fn one_of_a_hundred_thousand_moves_hides_and_shines() {
             drain.push(applied.elapsed());
             apply.push(applied - start);
             assert!(!changes.is_empty() && !changes.environment && changes.transforms.len() == bounds);
-            assert_eq!(environment, caustica_scene::Environment::DefaultSky);
+            assert_eq!(environment, Environment::DefaultSky);
         }
         let [apply, drain] = [apply, drain].map(median);
         println!("{name} one of 100,000: apply {apply:?}, drain {drain:?}");
@@ -188,6 +188,66 @@ fn one_of_a_hundred_thousand_moves_hides_and_shines() {
     assert!(document.drain_changes().environment && document.has_light());
     println!("a material of 100,000 starts to shine: drain {:?}", start.elapsed());
     assert!(document.renderable(target).is_some());
+}
+
+#[test]
+fn what_begins_to_shine_beside_a_lamp_is_not_looked_for() {
+    let (mut document, _) = crowd();
+    let (material, dull) = document.materials().next().map(|(id, m)| (id, m.clone())).unwrap();
+    let kind = LightKind::Point { radius_m: 0.0, range_m: None };
+    let lamp = NodeKind::Light(Light { color: Vec3::ONE, intensity: 1.0, kind });
+    let (lamp, edit) = document.add_edit(Node::new("lamp", lamp), None);
+    document.apply(edit).unwrap();
+    document.drain_changes();
+    let set = |document: &mut Document, emissive| {
+        let value = Box::new(Material { emissive, ..dull.clone() });
+        let start = Instant::now();
+        document.apply(Edit::SetMaterial { material, value }).unwrap();
+        assert!(!document.drain_changes().environment);
+        start.elapsed()
+    };
+    let times = (0..20).map(|i| set(&mut document, Vec3::splat(f32::from(i % 2 == 0)))).collect();
+    let time = median(times);
+    println!("a material of 100,000 beside a lamp starts or stops to shine: {time:?}");
+    assert!(time < BLUNDER);
+    // Without the lamp it counts that the last word was: dark.
+    let undo = document.apply(Edit::RemoveNode { node: lamp }).unwrap();
+    assert!(document.drain_changes().environment);
+    assert_eq!(document.effective_environment(), Environment::DefaultSky);
+    document.apply(undo).unwrap();
+    document.drain_changes();
+    set(&mut document, Vec3::ONE);
+    document.apply(Edit::RemoveNode { node: lamp }).unwrap();
+    assert!(!document.drain_changes().environment && document.has_light());
+}
+
+#[test]
+fn a_primitive_is_moved_without_a_look_at_its_vertices() {
+    const TRIANGLES: u32 = 1_000_000;
+    let mut document = Document::new();
+    let data = MeshData { indices: [0, 1, 2].repeat(TRIANGLES as usize), ..triangle() };
+    let mut whole = mesh(data);
+    let primitives = vec![Primitive { index_count: TRIANGLES * 3, ..whole.primitives[0] }];
+    whole = Mesh::new(whole.name, whole.data, primitives);
+    let mut prefab = Prefab::new("thing", "thing.gltf");
+    prefab.set_nodes(Vec::new()).unwrap();
+    let materials = vec![Material::default()];
+    document
+        .add_imported(Imported { prefab, meshes: vec![whole], materials, ..Imported::default() })
+        .unwrap();
+    let mesh = document.meshes().next().unwrap().0;
+    let mut times = Vec::new();
+    for step in 1..20 {
+        let mesh_from_primitive = DAffine3::from_translation(DVec3::X * f64::from(step));
+        let start = Instant::now();
+        document.apply(Edit::SetPrimitiveTransform { mesh, primitive: 0, mesh_from_primitive }).unwrap();
+        times.push(start.elapsed());
+        let (low, high) = document.mesh(mesh).unwrap().bounds.unwrap();
+        assert_eq!((low.x, high.x), (f64::from(step), f64::from(step) + 1.0));
+    }
+    let time = median(times);
+    println!("a primitive of {TRIANGLES} triangles moves: {time:?}");
+    assert!(time < BLUNDER);
 }
 
 #[test]

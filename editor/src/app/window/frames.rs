@@ -92,7 +92,8 @@ impl EditorWindow {
         let target_ms = config.adaptive.then_some(f64::from(config.target_frame_ms));
         let divisor = self.adaptive.next(Instant::now(), moving, full, target_ms);
         self.editor.state.view.divisor = divisor;
-        match self.editor.session.begin_frame(full.map(|side| side.div_ceil(divisor).max(1))) {
+        self.editor.session.set_divisor(divisor);
+        match self.editor.session.begin_frame(full) {
             Ok(recorder) => {
                 self.broken = None;
                 self.shown = Some(key);

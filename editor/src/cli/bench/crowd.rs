@@ -159,19 +159,18 @@ impl Crowd {
 
     /// Renders one frame and waits for it, so that the next one does not wait.
     pub(super) fn frame(&mut self) -> anyhow::Result<FrameCost> {
+        let cost = self.frame_without_waiting()?;
+        self.session.finish()?;
+        Ok(cost)
+    }
+
+    /// Renders one frame and goes on, as the window does.
+    pub(super) fn frame_without_waiting(&mut self) -> anyhow::Result<FrameCost> {
         let recorder = self.session.begin_frame(EXTENT)?;
         let host = self.session.host_times();
         let mut lap = Lap::start();
         self.session.submit(recorder, None)?;
-        let submit_ms = lap.ms();
-        self.session.finish()?;
-        Ok(FrameCost { host, submit_ms })
-    }
-
-    /// Renders one frame and goes on, as the window does.
-    pub(super) fn frame_without_waiting(&mut self) -> anyhow::Result<()> {
-        let recorder = self.session.begin_frame(EXTENT)?;
-        self.session.submit(recorder, None)
+        Ok(FrameCost { host, submit_ms: lap.ms() })
     }
 
     /// Index of the node that the camera waits for.

@@ -1,15 +1,22 @@
 //! One node moves in documents of more and more nodes: what should cost the same whatever the size. Enters: sizes. Leaves:
 //! host times, bytes and device times of the frame that shows the move, and after how many frames that is.
+//!
+//! A round moves three nodes. The first move comes after a wait, as in a window at rest; the second right behind it; before
+//! the third the host's caches are emptied. The device is kept at work in between, and the bare structure is refitted in
+//! the same round.
 
-use caustica_renderer::gpu::Frames;
-use caustica_renderer::{AccelBench, Pipeline, TlasTimes, TlasWork, gpu_types};
+mod tables;
+
+use std::time::{Duration, Instant};
+
+use caustica_renderer::gpu::{BuildMode, Frames};
+use caustica_renderer::{AccelBench, BareStructure, Pipeline, TlasWork};
 use serde::Serialize;
 use serde_json::json;
 
-use super::crowd::{Crowd, FAR, plain};
+use super::crowd::{Crowd, FAR, FrameCost, plain};
 use super::edits;
 use super::series::{Series, Spread, passes_ms};
-use super::table::{Table, count, figure};
 use super::{Bench, Measured};
 use crate::session::Lap;
 
@@ -18,13 +25,25 @@ const NODES_QUICK: [usize; 3] = [1, 100, 1000];
 const PIPELINES: [Pipeline; 2] = [Pipeline::Raytraced, Pipeline::Hybrid];
 /// Unmeasured moves of each document, with a still frame after each: their bytes are counted.
 const WARM_UPS: usize = 5;
+/// How long the host waits for the device before the first move of a round, milliseconds: more than one frame of a window.
+pub(super) const WAIT_MS: f64 = 20.0;
+/// Memory that the host walks over to empty its caches, bytes: more than the last level of common processors.
+const FLOOD_BYTES: usize = 128 << 20;
+/// How long the queue is empty before the refits that are to find a device at rest.
+const REST: Duration = Duration::from_millis(100);
+const REST_ROUNDS: usize = 8;
+/// Rounds of a slow device end after this long, but not before so many.
+const ENOUGH: Duration = Duration::from_secs(180);
+const FEWEST_ROUNDS: usize = 15;
 
-/// Figures of one document and pipeline.
+/// Whether another round of at most `most` is due, `round` of them being done since `start`.
+pub(super) fn goes_on(round: usize, most: usize, start: Instant) -> bool {
+    round < most && (round < FEWEST_ROUNDS || start.elapsed() < ENOUGH)
+}
+
+/// Host time of a move under one condition.
 #[derive(Debug, Default, Serialize)]
-struct Row {
-    nodes: usize,
-    pipeline: &'static str,
-    moves: usize,
+struct Host {
     /// The edit itself.
     edit_ms: Spread,
     /// Drained and flattened.
@@ -38,6 +57,16 @@ struct Row {
     /// `begin_frame` less the waiting for the device.
     begin_frame_ms: Spread,
     submit_ms: Spread,
+}
+
+/// Figures of one document and pipeline.
+#[derive(Debug, Default, Serialize)]
+struct Row {
+    nodes: usize,
+    pipeline: &'static str,
+    moves: usize,
+    /// By condition, in the order of [`CONDITIONS`].
+    host: [Host; 3],
     /// Uploaded in the frame of a move, less the constants of a frame.
     moved_bytes: u64,
     /// Uploaded in the still frame after it, likewise.
@@ -45,8 +74,15 @@ struct Row {
     constant_bytes: u64,
     /// Device time of descriptors, BLASes and TLAS.
     accel_ms: Spread,
-    /// As many instances of one cube, nothing else in the program.
-    bare_tlas: Option<TlasTimes>,
+    /// The TLAS alone.
+    tlas_ms: Spread,
+    /// Its descriptors.
+    descriptors_ms: Spread,
+    /// As many instances of one cube, nothing else in the program, refitted in the same rounds.
+    bare_refit_ms: Spread,
+    tlas_over_bare: Option<f64>,
+    /// The same after the queue has been empty for a while.
+    bare_refit_at_rest_ms: Spread,
     /// Of all passes.
     device_ms: Spread,
     tlas_refits: u64,
@@ -55,9 +91,11 @@ struct Row {
     latency_frames: u32,
 }
 
+/// What came before a move.
+const CONDITIONS: [&str; 3] = ["after a wait", "back to back", "cold caches"];
+
 #[derive(Default)]
-struct Tally {
-    row: Row,
+struct HostTally {
     edit: Series,
     sync: Series,
     apply: Series,
@@ -65,70 +103,84 @@ struct Tally {
     render: Series,
     begin_frame: Series,
     submit: Series,
+}
+
+#[derive(Default)]
+struct Tally {
+    row: Row,
+    host: [HostTally; 3],
     accel: Series,
+    tlas: Series,
+    descriptors: Series,
+    bare_refit: Series,
+    at_rest: Series,
     device: Series,
 }
 
 /// The passes that bring acceleration structures up to date.
-pub(super) const ACCEL_PASSES: [&str; 2] = ["accel.", "instance_descriptors"];
+const ACCEL_PASSES: [&str; 2] = ["accel.", DESCRIPTORS_PASS];
+pub(super) const TLAS_PASS: &str = "accel.tlas";
+const DESCRIPTORS_PASS: &str = "instance_descriptors";
+
+/// A document with a bare TLAS of as many instances.
+pub(super) struct Pair {
+    pub(super) crowd: Crowd,
+    pub(super) bare: BareStructure,
+}
 
 pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
     let sizes = bench.sizes(&NODES, &NODES_QUICK);
     let rounds = if bench.quick { 12 } else { 60 };
     let edit_rounds = if bench.quick { 3 } else { 20 };
-    let steps = 1 + PIPELINES.len() * (1 + rounds) + edits::steps() * edit_rounds;
+    let steps = 1 + PIPELINES.len() * rounds + edits::steps() * edit_rounds;
     let bar = bench.bar("moves", sizes.len() * steps);
-    let mut crowds = Vec::new();
+    let mut frames = Frames::new(&bench.device)?;
+    let mut accel = AccelBench::new(&bench.device, &mut frames)?;
+    let mut pairs = Vec::new();
     for size in sizes {
         bar.set_message(format!("document of {size} nodes"));
-        crowds.push(Crowd::new(bench, *size, Pipeline::Raytraced)?);
+        let crowd = Crowd::new(bench, *size, Pipeline::Raytraced)?;
+        pairs.push(Pair { crowd, bare: accel.bare_instances(*size as u32)? });
         bar.inc(1);
     }
+    let mut flood = vec![0_u8; FLOOD_BYTES];
     let mut rows = Vec::new();
     for pipeline in PIPELINES {
+        bar.set_message(format!("{} warms up", pipeline.name()));
         let mut tallies = Vec::new();
-        for crowd in &mut crowds {
-            // Right before the moves, so that both meet the machine in the same mood.
-            bar.set_message("bare TLAS");
-            let bare_tlas = bare_tlas(bench, crowd.len() as u32)?;
-            bar.inc(1);
-            bar.set_message(format!("{} warms up", pipeline.name()));
-            let row = Row { bare_tlas: Some(bare_tlas), ..warm_up(crowd, pipeline)? };
-            tallies.push(Tally { row, ..Tally::default() });
+        for pair in &mut pairs {
+            tallies.push(Tally { row: warm_up(&mut pair.crowd, pipeline)?, ..Tally::default() });
         }
-        // One move in each document after the other, so that a slow second of the machine falls on all of them.
+        accel.warm_up()?;
+        // One round of each document after the other, so that a slow second of the machine falls on all of them.
         bar.set_message(pipeline.name());
-        for round in 0..rounds {
-            for (crowd, tally) in crowds.iter_mut().zip(&mut tallies) {
-                one_move(crowd, round, tally)?;
+        let start = Instant::now();
+        for round in (0..).take_while(|round| goes_on(*round, rounds, start)) {
+            for (pair, tally) in pairs.iter_mut().zip(&mut tallies) {
+                one_round(&mut accel, pair, &mut flood, round, tally)?;
                 bar.inc(1);
             }
         }
-        for (crowd, tally) in crowds.iter_mut().zip(tallies) {
-            let row = tally.finish();
-            rows.push(Row { latency_frames: crowd.latency_frames()?, ..row });
+        for (pair, mut tally) in pairs.iter_mut().zip(tallies) {
+            refits_at_rest(&mut accel, &pair.bare, &mut tally.at_rest)?;
+            rows.push(Row { latency_frames: pair.crowd.latency_frames()?, ..tally.finish() });
         }
     }
     bar.set_message("other edits");
-    crowds.iter_mut().for_each(|crowd| crowd.session.set_settings(plain(Pipeline::Raytraced)));
-    let edits = edits::run(&mut crowds, edit_rounds, &bar)?;
+    pairs.iter_mut().for_each(|pair| pair.crowd.session.set_settings(plain(Pipeline::Raytraced)));
+    let edits = edits::run(&mut accel, &mut pairs, edit_rounds, &bar)?;
     bar.finish_and_clear();
-    let documents: Vec<_> = crowds
+    let documents: Vec<_> = pairs
         .iter()
-        .map(|crowd| {
+        .map(|Pair { crowd, .. }| {
             json!({ "nodes": crowd.len(), "document_s": crowd.document_s, "first_frame_s": crowd.first_frame_s })
         })
         .collect();
-    let tables =
-        vec![host_table(&rows), device_table(&rows), edits::table_of(&edits), document_table(&crowds)];
     let figures = json!({ "rows": rows, "edits": edits, "documents": documents });
-    Ok(Measured { figures, tables })
-}
-
-/// The TLAS alone, without the program around it: the floor of this very run.
-fn bare_tlas(bench: &Bench, instances: u32) -> anyhow::Result<TlasTimes> {
-    let mut frames = Frames::new(&bench.device)?;
-    Ok(AccelBench::new(&bench.device, &mut frames)?.instances(instances)?)
+    let mut shown = tables::of(&rows);
+    shown.extend(edits::tables_of(&edits));
+    shown.push(tables::documents(&pairs));
+    Ok(Measured { figures, tables: shown })
 }
 
 fn warm_up(crowd: &mut Crowd, pipeline: Pipeline) -> anyhow::Result<Row> {
@@ -151,35 +203,76 @@ fn warm_up(crowd: &mut Crowd, pipeline: Pipeline) -> anyhow::Result<Row> {
     Ok(row)
 }
 
-fn one_move(crowd: &mut Crowd, round: usize, tally: &mut Tally) -> anyhow::Result<()> {
-    let edit = crowd.next_move(round * FAR);
+fn one_round(
+    accel: &mut AccelBench<'_>,
+    pair: &mut Pair,
+    flood: &mut [u8],
+    round: usize,
+    tally: &mut Tally,
+) -> anyhow::Result<()> {
+    let Pair { crowd, bare } = pair;
+    accel.keep_busy(WAIT_MS)?;
+    one_move(crowd, 3 * round, 0, tally)?;
+    one_move(crowd, 3 * round + 1, 1, tally)?;
+    crowd.session.finish()?;
+    let passes = &crowd.session.statistics().passes;
+    tally.accel.push(passes_ms(passes, &ACCEL_PASSES));
+    tally.tlas.push(passes_ms(passes, &[TLAS_PASS]));
+    tally.descriptors.push(passes_ms(passes, &[DESCRIPTORS_PASS]));
+    tally.device.push(passes.iter().map(|(_, ms)| ms).sum());
+    // The second of two, as the move's: both find the device's caches the same.
+    accel.run(bare, BuildMode::Refit)?;
+    tally.bare_refit.push(accel.run(bare, BuildMode::Refit)?);
+    // Every line of the processor's caches is written.
+    flood.iter_mut().step_by(64).for_each(|byte| *byte = byte.wrapping_add(1));
+    one_move(crowd, 3 * round + 2, 2, tally)?;
+    crowd.session.finish()
+}
+
+fn one_move(crowd: &mut Crowd, index: usize, condition: usize, tally: &mut Tally) -> anyhow::Result<()> {
+    let edit = crowd.next_move(index * FAR);
     let mut lap = Lap::start();
     crowd.session.push(edit)?;
     crowd.session.end_gesture();
     let edit_ms = lap.ms();
-    let cost = crowd.frame()?;
-    let host = cost.host;
-    tally.edit.push(edit_ms);
-    tally.sync.push(host.sync_ms);
-    tally.apply.push(host.apply_ms);
-    tally.scene.push(edit_ms + host.sync_ms + host.apply_ms);
-    tally.render.push(host.render_ms);
-    tally.begin_frame.push(host.sync_ms + host.apply_ms + host.render_ms);
-    tally.submit.push(cost.submit_ms);
-    let statistics = crowd.session.statistics();
-    tally.accel.push(passes_ms(&statistics.passes, &ACCEL_PASSES));
-    tally.device.push(statistics.passes.iter().map(|(_, ms)| ms).sum());
-    anyhow::ensure!(statistics.acceleration.tlas != TlasWork::Kept, "a move changed nothing");
+    let cost = crowd.frame_without_waiting()?;
+    tally.host[condition].note(edit_ms, &cost);
+    let work = &crowd.session.statistics().acceleration;
+    anyhow::ensure!(work.tlas != TlasWork::Kept, "a move changed nothing");
     tally.row.moves += 1;
-    tally.row.tlas_refits += u64::from(statistics.acceleration.tlas == TlasWork::Refit);
-    tally.row.tlas_builds += u64::from(statistics.acceleration.tlas == TlasWork::Built);
-    tally.row.blas_builds += statistics.acceleration.blas_built;
+    tally.row.tlas_refits += u64::from(work.tlas == TlasWork::Refit);
+    tally.row.tlas_builds += u64::from(work.tlas == TlasWork::Built);
+    tally.row.blas_builds += work.blas_built;
     Ok(())
 }
 
-impl Tally {
-    fn finish(self) -> Row {
-        Row {
+/// What the same work takes on a device that has just been idle.
+fn refits_at_rest(
+    accel: &mut AccelBench<'_>,
+    bare: &BareStructure,
+    times: &mut Series,
+) -> anyhow::Result<()> {
+    for _ in 0..REST_ROUNDS {
+        std::thread::sleep(REST);
+        times.push(accel.run(bare, BuildMode::Refit)?);
+    }
+    Ok(())
+}
+
+impl HostTally {
+    fn note(&mut self, edit_ms: f64, cost: &FrameCost) {
+        let host = cost.host;
+        self.edit.push(edit_ms);
+        self.sync.push(host.sync_ms);
+        self.apply.push(host.apply_ms);
+        self.scene.push(edit_ms + host.sync_ms + host.apply_ms);
+        self.render.push(host.render_ms);
+        self.begin_frame.push(host.sync_ms + host.apply_ms + host.render_ms);
+        self.submit.push(cost.submit_ms);
+    }
+
+    fn finish(self) -> Host {
+        Host {
             edit_ms: self.edit.spread(),
             sync_ms: self.sync.spread(),
             apply_ms: self.apply.spread(),
@@ -187,85 +280,23 @@ impl Tally {
             render_ms: self.render.spread(),
             begin_frame_ms: self.begin_frame.spread(),
             submit_ms: self.submit.spread(),
-            accel_ms: self.accel.spread(),
-            device_ms: self.device.spread(),
-            ..self.row
         }
     }
 }
 
-fn host_table(rows: &[Row]) -> Table {
-    let head = [
-        "nodes",
-        "pipeline",
-        "edit",
-        "sync",
-        "apply",
-        "edit + sync + apply",
-        "begin_frame without waiting",
-        "submit",
-        "bytes, moved",
-        "bytes, settled",
-    ];
-    let mut table = Table::new("One node moves: the host, ms", &head);
-    for row in rows {
-        table.row(vec![
-            count(row.nodes as u64),
-            row.pipeline.to_owned(),
-            row.edit_ms.to_string(),
-            row.sync_ms.to_string(),
-            row.apply_ms.to_string(),
-            row.scene_ms.to_string(),
-            row.begin_frame_ms.to_string(),
-            row.submit_ms.to_string(),
-            count(row.moved_bytes),
-            count(row.settled_bytes),
-        ]);
+impl Tally {
+    fn finish(self) -> Row {
+        let (tlas_ms, bare_refit_ms) = (self.tlas.spread(), self.bare_refit.spread());
+        Row {
+            host: self.host.map(HostTally::finish),
+            accel_ms: self.accel.spread(),
+            tlas_ms,
+            descriptors_ms: self.descriptors.spread(),
+            bare_refit_ms,
+            tlas_over_bare: tlas_ms.over(&bare_refit_ms),
+            bare_refit_at_rest_ms: self.at_rest.spread(),
+            device_ms: self.device.spread(),
+            ..self.row
+        }
     }
-    let constants = rows.first().map_or(0, |row| row.constant_bytes);
-    table.note(format!(
-        "Bytes are those of one moved node; the constants of a frame ({constants} bytes, its record {}) are taken off. \
-         Settled: the frame after the move, in which the previous transform becomes the present one. The documents take \
-         turns, the smallest after the largest, whose frame leaves it cold caches.",
-        size_of::<gpu_types::Frame>()
-    ));
-    table
-}
-
-fn device_table(rows: &[Row]) -> Table {
-    let head = [
-        "nodes",
-        "pipeline",
-        "accel.*, descriptors",
-        "bare TLAS refit",
-        "bare TLAS build",
-        "TLAS refitted, built",
-        "all passes",
-        "frames until shown",
-    ];
-    let mut table = Table::new("One node moves: the device, ms", &head);
-    for row in rows {
-        let bare =
-            |of: fn(&TlasTimes) -> f64| row.bare_tlas.as_ref().map_or_else(String::new, |t| figure(of(t)));
-        table.row(vec![
-            count(row.nodes as u64),
-            row.pipeline.to_owned(),
-            row.accel_ms.to_string(),
-            bare(|times| times.refit_ms),
-            bare(|times| times.build_ms),
-            format!("{}, {}", row.tlas_refits, row.tlas_builds),
-            row.device_ms.to_string(),
-            row.latency_frames.to_string(),
-        ]);
-    }
-    table.note("Bare: as many instances of one cube, nothing else in the program (`AccelBench`), right before the moves.");
-    table
-}
-
-fn document_table(crowds: &[Crowd]) -> Table {
-    let mut table = Table::new("The documents, seconds", &["nodes", "made by edits", "first picture"]);
-    for crowd in crowds {
-        table.row(vec![count(crowd.len() as u64), figure(crowd.document_s), figure(crowd.first_frame_s)]);
-    }
-    table
 }

@@ -31,6 +31,13 @@ impl Series {
     }
 }
 
+impl Spread {
+    /// Median by median; `None`: nothing was measured.
+    pub(super) fn over(&self, other: &Self) -> Option<f64> {
+        (other.median > 0.0).then(|| self.median / other.median)
+    }
+}
+
 impl std::fmt::Display for Spread {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} ({})", figure(self.median), figure(self.p95))

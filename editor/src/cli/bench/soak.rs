@@ -1,7 +1,7 @@
 //! Thousands of edits, each taken back, with a frame after every step: memory must stay where it was. Enters: how many.
 //! Leaves: memory by kind and of the process after some of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use caustica_renderer::Pipeline;
 use caustica_scene::{Edit, NodeId};
@@ -14,11 +14,13 @@ use super::{Bench, Measured, machine};
 
 const NODES: usize = 1000;
 /// Cycles after which memory is looked at.
-const LOOKS: [usize; 3] = [100, 1000, 10_000];
-const LOOKS_QUICK: [usize; 2] = [100, 300];
+const LOOKS: [usize; 4] = [100, 1000, 5000, 10_000];
+const LOOKS_QUICK: [usize; 3] = [100, 150, 300];
+/// Readings of the process's memory over the last half of the cycles.
+const READINGS: usize = 50;
 /// Still frames before a look: what compaction and the retire queue hold comes to its end.
 const REST_FRAMES: usize = 8;
-/// Largest growth of the process between the last two looks that still counts as steady.
+/// Largest growth of the process over the last half of the cycles that still counts as steady.
 const STEADY_SHARE: f64 = 0.01;
 
 /// Memory after a number of cycles.
@@ -39,6 +41,7 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
     crowd.frame()?;
     let before = crowd.session.document().clone();
     let mut looks = Vec::new();
+    let mut readings = Vec::new();
     for cycle in 0..last {
         edit(&mut crowd, cycle, lone)?;
         crowd.session.end_gesture();
@@ -46,16 +49,24 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
         anyhow::ensure!(crowd.session.undo().is_some(), "there was nothing to undo after cycle {cycle}");
         crowd.frame_without_waiting()?;
         bar.inc(1);
+        if 2 * cycle >= last && (cycle + 1).is_multiple_of((last / 2 / READINGS).max(1)) {
+            readings.extend(machine::resident_bytes().map(|bytes| (cycle as f64, bytes as f64)));
+        }
         if looks_at.contains(&(cycle + 1)) {
             looks.push(look(bench, &mut crowd, cycle + 1)?);
         }
     }
     bar.finish_and_clear();
     let unchanged = *crowd.session.document() == before;
-    let steady = Steady::of(&looks);
-    let table = table_of(&looks, &steady, unchanged);
-    let figures =
-        json!({ "nodes": NODES, "looks": looks, "steady": steady, "document_unchanged": unchanged });
+    let (device, process) = (on_device(&looks), Process::of(&readings));
+    let table = table_of(&looks, device, process.as_ref(), unchanged);
+    let figures = json!({
+        "nodes": NODES,
+        "looks": looks,
+        "device": { "growth_bytes": device, "steady": device == Some(0) },
+        "process": process,
+        "document_unchanged": unchanged,
+    });
     Ok(Measured { figures, tables: vec![table] })
 }
 
@@ -81,30 +92,55 @@ fn look(bench: &Bench, crowd: &mut Crowd, cycles: usize) -> anyhow::Result<Look>
     Ok(Look { cycles, device_bytes, resident_bytes: machine::resident_bytes() })
 }
 
-/// What the last two looks say.
+/// By how many bytes the device's memory differs between the first and the last look, all kinds together but none against
+/// another; `None`: one look tells nothing.
+fn on_device(looks: &[Look]) -> Option<u64> {
+    let [first, .., last] = looks else { return None };
+    let of = |look: &Look, kind: &str| look.device_bytes.get(kind).copied().unwrap_or(0);
+    let kinds: BTreeSet<&str> = first.device_bytes.keys().chain(last.device_bytes.keys()).copied().collect();
+    Some(kinds.into_iter().map(|kind| of(first, kind).abs_diff(of(last, kind))).sum())
+}
+
+/// Memory of the process over the last half of the cycles: a straight line through the readings, and how far they lie from
+/// it. The allocator takes and gives back memory in pieces, so that single readings say little.
 #[derive(Debug, Serialize)]
-struct Steady {
-    device_growth_bytes: i64,
-    resident_growth: Option<f64>,
+struct Process {
+    readings: usize,
+    /// Of the line, by the mean.
+    growth_share: f64,
+    /// Largest distance of a reading from the line, by the mean.
+    noise_share: f64,
     steady: bool,
 }
 
-impl Steady {
-    fn of(looks: &[Look]) -> Self {
-        let (Some(now), Some(before)) = (looks.last(), looks.iter().nth_back(1)) else {
-            return Self { device_growth_bytes: 0, resident_growth: None, steady: false };
-        };
-        let total = |look: &Look| look.device_bytes.values().sum::<u64>() as i64;
-        let device_growth_bytes = total(now) - total(before);
-        let resident = now.resident_bytes.zip(before.resident_bytes);
-        let resident_growth = resident.map(|(now, before)| now as f64 / before as f64 - 1.0);
-        let steady = now.device_bytes == before.device_bytes
-            && resident_growth.is_none_or(|share| share < STEADY_SHARE);
-        Self { device_growth_bytes, resident_growth, steady }
+impl Process {
+    /// `readings`: cycle and bytes; `None` for fewer than two.
+    fn of(readings: &[(f64, f64)]) -> Option<Self> {
+        let (first, last) = (readings.first()?, readings.last()?);
+        let span = last.0 - first.0;
+        if span <= 0.0 {
+            return None;
+        }
+        let n = readings.len() as f64;
+        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| readings.iter().map(of).sum::<f64>() / n;
+        let (x, y) = (mean(&|r| r.0), mean(&|r| r.1));
+        let slope = mean(&|r| (r.0 - x) * (r.1 - y)) / mean(&|r| (r.0 - x).powi(2));
+        let distance = |r: &(f64, f64)| (r.1 - y - slope * (r.0 - x)).abs();
+        let growth_share = slope * span / y;
+        Some(Self {
+            readings: readings.len(),
+            growth_share,
+            noise_share: readings.iter().map(distance).fold(0.0, f64::max) / y,
+            steady: growth_share < STEADY_SHARE,
+        })
     }
 }
 
-fn table_of(looks: &[Look], steady: &Steady, unchanged: bool) -> Table {
+fn verdict(steady: bool) -> &'static str {
+    if steady { "steady" } else { "NOT steady" }
+}
+
+fn table_of(looks: &[Look], device: Option<u64>, process: Option<&Process>, unchanged: bool) -> Table {
     let mut kinds: Vec<&'static str> =
         looks.iter().flat_map(|look| look.device_bytes.keys().copied()).collect();
     kinds.sort_unstable();
@@ -120,13 +156,29 @@ fn table_of(looks: &[Look], steady: &Steady, unchanged: bool) -> Table {
         row.push(look.resident_bytes.map_or_else(|| String::from("unknown"), count));
         table.row(row);
     }
-    let resident =
-        steady.resident_growth.map_or_else(String::new, |share| format!(", process {:+.2} %", share * 100.0));
+    let after = looks.first().map_or(0, |look| look.cycles);
+    table.note(match device {
+        Some(bytes) => format!(
+            "Device: {bytes} bytes apart, kind by kind, between {} cycles and the last: {}.",
+            count(after as u64),
+            verdict(bytes == 0)
+        ),
+        None => String::from("Device: not judged."),
+    });
+    table.note(match process {
+        Some(process) => format!(
+            "Process: {:+.3} % over the last half of the cycles (a line through {} readings, none farther from it than \
+             {:.3} %: the allocator's noise): {}.",
+            process.growth_share * 100.0,
+            process.readings,
+            process.noise_share * 100.0,
+            verdict(process.steady)
+        ),
+        None => String::from("Process: the system does not tell its memory."),
+    });
     table.note(format!(
-        "Between the last two: device {:+} bytes{resident}: {}. The document is {} afterwards.",
-        steady.device_growth_bytes,
-        if steady.steady { "steady" } else { "NOT steady" },
-        if unchanged { "as it was" } else { "NOT as it was" },
+        "The document is {} afterwards.",
+        if unchanged { "as it was" } else { "NOT as it was" }
     ));
     table.note("A cycle moves, hides, deletes, gives a material to or copies a node, renders, undoes and renders again.");
     table
@@ -136,15 +188,31 @@ fn table_of(looks: &[Look], steady: &Steady, unchanged: bool) -> Table {
 mod tests {
     use super::*;
 
-    fn at(cycles: usize, tables: u64, resident: u64) -> Look {
-        Look { cycles, device_bytes: BTreeMap::from([("tables", tables)]), resident_bytes: Some(resident) }
+    fn at(cycles: usize, tables: u64, targets: u64) -> Look {
+        let device_bytes = BTreeMap::from([("tables", tables), ("targets", targets)]);
+        Look { cycles, device_bytes, resident_bytes: None }
     }
 
     #[test]
-    fn steady_means_not_a_byte_on_the_device_and_hardly_one_in_the_process() {
-        assert!(Steady::of(&[at(1, 5, 100), at(2, 7, 1000), at(3, 7, 1009)]).steady);
-        assert!(!Steady::of(&[at(2, 7, 1000), at(3, 8, 1000)]).steady);
-        assert!(!Steady::of(&[at(2, 7, 1000), at(3, 7, 1020)]).steady);
-        assert!(!Steady::of(&[at(2, 7, 1000)]).steady, "one look tells nothing");
+    fn the_device_is_steady_when_no_kind_differs_by_a_byte() {
+        assert_eq!(on_device(&[at(1, 5, 8), at(2, 7, 9), at(3, 5, 8)]), Some(0));
+        assert_eq!(on_device(&[at(1, 5, 8), at(2, 5, 9)]), Some(1));
+        assert_eq!(on_device(&[at(1, 5, 8), at(2, 6, 7)]), Some(2), "what one lost the other has not got");
+        assert_eq!(on_device(&[at(1, 5, 8)]), None);
+    }
+
+    #[test]
+    fn the_process_is_judged_by_a_line_and_its_noise_told() {
+        let judged = |of: &dyn Fn(f64) -> f64| {
+            let readings: Vec<_> = (0..=100).map(f64::from).map(|cycle| (cycle, of(cycle))).collect();
+            Process::of(&readings)
+                .map_or((f64::NAN, f64::NAN, false), |p| (p.growth_share, p.noise_share, p.steady))
+        };
+        assert_eq!(judged(&|_| 1000.0), (0.0, 0.0, true));
+        let (growth, noise, steady) = judged(&|cycle| 990.0 + 0.2 * cycle);
+        assert!((growth - 0.02).abs() < 1e-9 && noise < 1e-9 && !steady, "{growth} {noise}");
+        let (growth, noise, steady) = judged(&|cycle| if cycle == 50.0 { 1100.0 } else { 1000.0 });
+        assert!(growth.abs() < 1e-9 && (noise - 0.099).abs() < 1e-3 && steady, "{growth} {noise}");
+        assert!(Process::of(&[(1.0, 1.0)]).is_none());
     }
 }

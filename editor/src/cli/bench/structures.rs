@@ -1,6 +1,8 @@
 //! Builds, refits and compaction of bare acceleration structures, beside what the same device did without this program.
 //! Enters: sizes. Leaves: milliseconds and bytes.
 
+mod session;
+
 use caustica_renderer::gpu::Frames;
 use caustica_renderer::{AccelBench, BlasTimes, TlasTimes};
 use serde::Serialize;
@@ -15,6 +17,9 @@ const BOXES: [u32; 1] = [2_000_000];
 const BOXES_QUICK: [u32; 1] = [2000];
 const INSTANCES: [u32; 4] = [1, 1000, 100_000, 1_000_000];
 const INSTANCES_QUICK: [u32; 2] = [1, 1000];
+/// Triangles of the mesh that is built through a document, and rounds.
+const IN_SESSION: (u32, usize) = (100_000, 30);
+const IN_SESSION_QUICK: (u32, usize) = (1000, 3);
 
 /// What a bare program measured on a device: lowest and highest milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -117,13 +122,16 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
         tlas.push(accel.instances(*size)?);
         bar.inc(1);
     }
+    bar.set_message("in a document");
+    let (triangles, rounds) = if bench.quick { IN_SESSION_QUICK } else { IN_SESSION };
+    let in_session = session::run(bench, &mut accel, triangles, rounds)?;
     bar.finish_and_clear();
     let name = bench.device.name();
     let (blas_rows, blas_table) = blas_figures(name, &blas);
     let (tlas_rows, tlas_table) = tlas_figures(name, &tlas);
     Ok(Measured {
-        figures: json!({ "blas": blas_rows, "tlas": tlas_rows }),
-        tables: vec![blas_table, tlas_table],
+        figures: json!({ "blas": blas_rows, "tlas": tlas_rows, "in_session": in_session }),
+        tables: vec![blas_table, tlas_table, session::table_of(&in_session)],
     })
 }
 

@@ -63,6 +63,11 @@ pub(super) fn figure(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
+/// A ratio in words.
+pub(super) fn times(ratio: Option<f64>) -> String {
+    ratio.map_or_else(String::new, |ratio| format!("x {ratio:.2}"))
+}
+
 /// A whole number with its thousands set apart.
 pub(super) fn count(value: u64) -> String {
     let digits = value.to_string();

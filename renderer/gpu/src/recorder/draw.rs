@@ -33,7 +33,8 @@ impl Recorder {
         all.extend(colors.iter().map(|image| Use::Image(image, Stage::Raster, Access::ColorAttachment)));
         all.extend(depth.map(|image| Use::Image(image, Stage::Raster, Access::DepthAttachment)));
         for (pipeline, draws) in pipelines {
-            all.extend(draws.iter().map(|draw| Use::Buffer(draw.indices, Stage::Raster, Access::IndexRead)));
+            let indices = draws.iter().filter_map(|draw| draw.indices);
+            all.extend(indices.map(|buffer| Use::Buffer(buffer, Stage::Raster, Access::IndexRead)));
             all.extend(self.uses_of(&pipeline.raw, Stage::Raster, binds)?);
         }
         self.declare(&all);
@@ -94,9 +95,13 @@ impl Recorder {
         unsafe {
             raw.cmd_set_cull_mode(self.command, cull);
             raw.cmd_set_front_face(self.command, front);
-            raw.cmd_bind_index_buffer(self.command, draw.indices.raw, 0, vk::IndexType::UINT32);
             let (count, first) = (draw.index_count, draw.first_index);
-            raw.cmd_draw_indexed(self.command, count, draw.instance_count, first, 0, draw.first_instance);
+            if let Some(indices) = draw.indices {
+                raw.cmd_bind_index_buffer(self.command, indices.raw, 0, vk::IndexType::UINT32);
+                raw.cmd_draw_indexed(self.command, count, draw.instance_count, first, 0, draw.first_instance);
+            } else {
+                raw.cmd_draw(self.command, count, draw.instance_count, first, draw.first_instance);
+            }
         }
         Ok(())
     }

@@ -1,5 +1,8 @@
 //! Materials: metallic-roughness with its textures and the KHR extensions that the renderer shades.
-//! In: JSON. Out: [`Material`] with its shading mode. Format: glTF 2.0, section 3.9, and the extensions' texts.
+//! In: JSON. Out: [`Material`] with its shading mode, and warnings about values out of their range, which are held to it.
+//! Format: glTF 2.0, section 3.9, and the extensions' texts.
+
+use std::ops::RangeInclusive;
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -7,44 +10,185 @@ use super::json::{Fault, Item};
 use super::texture::TextureTable;
 use crate::assets::{AlphaMode, Material, ShadingMode, TextureUse};
 
+mod lobes;
+
 /// Share of transmitted light above which a material may count as glass.
 const GLASS_TRANSMISSION: f32 = 0.5;
 /// Roughness up to which glass counts as smooth.
 const SMOOTH_ROUGHNESS: f32 = 0.05;
 /// Emissive strength is cut here, far above every real light, so that a sum of samples stays finite.
 const MAX_EMISSIVE_STRENGTH: f32 = 1e15;
+/// Stands for an infinite index of refraction: all light is reflected.
+const INFINITE_IOR: f32 = 1e6;
 
-/// Reads all materials.
-pub(super) fn read_all(root: &Item<'_>, textures: &mut TextureTable) -> Result<Vec<Material>, Fault> {
-    root.objects("materials")?.iter().map(|item| read(item, textures)).collect()
+/// Share of something.
+const UNIT: RangeInclusive<f32> = 0.0..=1.0;
+/// What is not negative.
+const POSITIVE: RangeInclusive<f32> = 0.0..=f32::MAX;
+
+/// Reads all materials. The textures of extensions are asked for after those of all materials: projects know textures
+/// by their order, and older versions asked for the others alone.
+pub(super) fn read_all(
+    root: &Item<'_>,
+    textures: &mut TextureTable,
+) -> Result<(Vec<Material>, Vec<Fault>), Fault> {
+    let mut reader = Reader { textures, warnings: Vec::new() };
+    let items = root.objects("materials")?;
+    let mut materials: Vec<Material> =
+        items.iter().map(|item| reader.material(item)).collect::<Result<_, _>>()?;
+    for (item, material) in items.iter().zip(&mut materials) {
+        reader.extensions(item, material)?;
+        reader.lobes(item, material)?;
+        material.mode = shading_mode(item, material)?;
+    }
+    Ok((materials, reader.warnings))
 }
 
-fn read(item: &Item<'_>, textures: &mut TextureTable) -> Result<Material, Fault> {
-    let mut material = Material {
-        name: item.name()?,
-        emissive: Vec3::from(item.f32s_or("emissiveFactor", [0.0; 3])?).max(Vec3::ZERO),
-        emissive_texture: texture_use(item, "emissiveTexture", true, textures)?,
-        alpha: read_alpha(item)?,
-        double_sided: item.bool_or("doubleSided", false)?,
-        ..Material::default()
-    };
-    if let Some(pbr) = item.child("pbrMetallicRoughness")? {
-        material.base_color = Vec4::from(pbr.f32s_or("baseColorFactor", [1.0; 4])?).max(Vec4::ZERO);
-        material.base_color_texture = texture_use(&pbr, "baseColorTexture", true, textures)?;
-        material.metallic = pbr.f32_or("metallicFactor", 1.0)?.clamp(0.0, 1.0);
-        material.roughness = pbr.f32_or("roughnessFactor", 1.0)?.clamp(0.0, 1.0);
-        material.metallic_roughness_texture = texture_use(&pbr, "metallicRoughnessTexture", false, textures)?;
+struct Reader<'a> {
+    textures: &'a mut TextureTable,
+    warnings: Vec<Fault>,
+}
+
+impl Reader<'_> {
+    fn material(&mut self, item: &Item<'_>) -> Result<Material, Fault> {
+        let mut material = Material {
+            name: item.name()?,
+            emissive: Vec3::from(item.f32s_or("emissiveFactor", [0.0; 3])?).max(Vec3::ZERO),
+            emissive_texture: self.texture_use(item, "emissiveTexture", true)?,
+            alpha: read_alpha(item)?,
+            double_sided: item.bool_or("doubleSided", false)?,
+            ..Material::default()
+        };
+        if let Some(pbr) = item.child("pbrMetallicRoughness")? {
+            material.base_color = Vec4::from(pbr.f32s_or("baseColorFactor", [1.0; 4])?).max(Vec4::ZERO);
+            material.base_color_texture = self.texture_use(&pbr, "baseColorTexture", true)?;
+            material.metallic = self.within(&pbr, "metallicFactor", 1.0, UNIT)?;
+            material.roughness = self.within(&pbr, "roughnessFactor", 1.0, UNIT)?;
+            material.metallic_roughness_texture =
+                self.texture_use(&pbr, "metallicRoughnessTexture", false)?;
+        }
+        (material.normal_texture, material.normal_scale) = self.normal_map(item, "normalTexture")?;
+        if let Some(occlusion) = item.child("occlusionTexture")? {
+            material.occlusion_texture = self.texture_use(item, "occlusionTexture", false)?;
+            material.occlusion_strength = self.within(&occlusion, "strength", 1.0, UNIT)?;
+        }
+        Ok(material)
     }
-    if let Some(normal) = item.child("normalTexture")? {
-        material.normal_texture = texture_use(item, "normalTexture", false, textures)?;
-        material.normal_scale = normal.f32_or("scale", 1.0)?;
+
+    /// Extensions that refine what every material has.
+    fn extensions(&mut self, item: &Item<'_>, material: &mut Material) -> Result<(), Fault> {
+        if let Some(extension) = item.extension("KHR_materials_emissive_strength")? {
+            material.emissive_strength =
+                self.within(&extension, "emissiveStrength", 1.0, 0.0..=MAX_EMISSIVE_STRENGTH)?;
+        }
+        if let Some(extension) = item.extension("KHR_materials_ior")? {
+            material.ior = match extension.f32_or("ior", 1.5)? {
+                0.0 => INFINITE_IOR,
+                _ => self.within(&extension, "ior", 1.5, 1.0..=INFINITE_IOR)?,
+            };
+        }
+        if let Some(extension) = item.extension("KHR_materials_specular")? {
+            material.specular = self.within(&extension, "specularFactor", 1.0, UNIT)?;
+            material.specular_texture = self.texture_use(&extension, "specularTexture", false)?;
+            material.specular_color = self.color(&extension, "specularColorFactor", Vec3::ONE, POSITIVE)?;
+            material.specular_color_texture = self.texture_use(&extension, "specularColorTexture", true)?;
+        }
+        if let Some(extension) = item.extension("KHR_materials_transmission")? {
+            material.transmission = self.within(&extension, "transmissionFactor", 0.0, UNIT)?;
+            material.transmission_texture = self.texture_use(&extension, "transmissionTexture", false)?;
+        }
+        if let Some(extension) = item.extension("KHR_materials_volume")? {
+            self.volume(&extension, material)?;
+        }
+        if let Some(extras) = item.get("extras")
+            && extras.get("volumePriority").is_some()
+        {
+            material.volume_priority = extras.f32_or("volumePriority", 0.0)?.clamp(0.0, 255.0) as u8;
+        }
+        Ok(())
     }
-    if let Some(occlusion) = item.child("occlusionTexture")? {
-        material.occlusion_texture = texture_use(item, "occlusionTexture", false, textures)?;
-        material.occlusion_strength = occlusion.f32_or("strength", 1.0)?.clamp(0.0, 1.0);
+
+    fn volume(&mut self, extension: &Item<'_>, material: &mut Material) -> Result<(), Fault> {
+        material.thickness_m = self.within(extension, "thicknessFactor", 0.0, POSITIVE)?;
+        material.has_volume = material.thickness_m > 0.0;
+        material.thickness_texture = self.texture_use(extension, "thicknessTexture", false)?;
+        material.attenuation_color = self.color(extension, "attenuationColor", Vec3::ONE, UNIT)?;
+        // Absent means that nothing is attenuated; 0 and less are not allowed and read as absent.
+        material.attenuation_distance_m = match extension.f64("attenuationDistance")? {
+            Some(distance) if distance > 0.0 && (distance as f32).is_finite() => Some(distance as f32),
+            _ => None,
+        };
+        Ok(())
     }
-    read_extensions(item, &mut material)?;
-    Ok(material)
+
+    /// A number held to its range, with a warning where that changes it.
+    fn within(
+        &mut self,
+        item: &Item<'_>,
+        key: &str,
+        default: f32,
+        range: RangeInclusive<f32>,
+    ) -> Result<f32, Fault> {
+        let given = item.f32_or(key, default)?;
+        Ok(self.held(item, key, given, &range))
+    }
+
+    /// A linear colour, each channel held to the range.
+    fn color(
+        &mut self,
+        item: &Item<'_>,
+        key: &str,
+        default: Vec3,
+        range: RangeInclusive<f32>,
+    ) -> Result<Vec3, Fault> {
+        let given = item.f32s_or(key, default.to_array())?;
+        Ok(Vec3::from(given.map(|channel| self.held(item, key, channel, &range))))
+    }
+
+    fn held(&mut self, item: &Item<'_>, key: &str, given: f32, range: &RangeInclusive<f32>) -> f32 {
+        let held = given.clamp(*range.start(), *range.end());
+        if held != given {
+            let bounds = match *range.end() {
+                f32::MAX => format!("at least {}", range.start()),
+                end => format!("within {} and {end}", range.start()),
+            };
+            let reason = format!("{given} has to be {bounds}; {held} is taken");
+            self.warnings.push(Fault::new(format!("{}/{key}", item.place()), reason));
+        }
+        held
+    }
+
+    /// A normal map and its scale.
+    fn normal_map(&mut self, item: &Item<'_>, key: &str) -> Result<(Option<TextureUse>, f32), Fault> {
+        let scale = match item.child(key)? {
+            Some(info) => info.f32_or("scale", 1.0)?,
+            None => 1.0,
+        };
+        Ok((self.texture_use(item, key, false)?, scale))
+    }
+
+    /// A texture of a material, read as colour (`srgb`) or as data.
+    fn texture_use(&mut self, item: &Item<'_>, key: &str, srgb: bool) -> Result<Option<TextureUse>, Fault> {
+        let Some(info) = item.child(key)? else {
+            return Ok(None);
+        };
+        let index = info.required_index("index", self.textures.len(), "texture")?;
+        let mut tex_coord = info.size("texCoord")?.unwrap_or(0);
+        let mut texture_use = TextureUse::new(self.textures.want(index, srgb));
+        if let Some(transform) = info.extension("KHR_texture_transform")? {
+            texture_use.offset = Vec2::from(transform.f32s_or("offset", [0.0; 2])?);
+            texture_use.rotation_rad = transform.f32_or("rotation", 0.0)?;
+            texture_use.scale = Vec2::from(transform.f32s_or("scale", [1.0; 2])?);
+            tex_coord = transform.size("texCoord")?.unwrap_or(tex_coord);
+        }
+        if tex_coord > 1 {
+            let reason = format!("texture coordinates {tex_coord} are not read; the first ones stand in");
+            self.warnings.push(info.fault(reason));
+            tex_coord = 0;
+        }
+        texture_use.tex_coord = tex_coord as u32;
+        Ok(Some(texture_use))
+    }
 }
 
 fn read_alpha(item: &Item<'_>) -> Result<AlphaMode, Fault> {
@@ -56,71 +200,15 @@ fn read_alpha(item: &Item<'_>) -> Result<AlphaMode, Fault> {
     })
 }
 
-fn read_extensions(item: &Item<'_>, material: &mut Material) -> Result<(), Fault> {
-    if let Some(extension) = item.extension("KHR_materials_emissive_strength")? {
-        let strength = extension.f32_or("emissiveStrength", 1.0)?;
-        material.emissive_strength = strength.clamp(0.0, MAX_EMISSIVE_STRENGTH);
-    }
-    if let Some(extension) = item.extension("KHR_materials_ior")? {
-        // 0 stands for an infinite index in the extension: all light is reflected.
-        let ior = extension.f32_or("ior", 1.5)?;
-        material.ior = if ior == 0.0 { 1e6 } else { ior.max(1.0) };
-    }
-    if let Some(extension) = item.extension("KHR_materials_specular")? {
-        material.specular = extension.f32_or("specularFactor", 1.0)?.clamp(0.0, 1.0);
-        let tint = extension.f32s_or("specularColorFactor", [1.0; 3])?;
-        material.specular_color = Vec3::from(tint).max(Vec3::ZERO);
-    }
-    let mut textured = false;
-    if let Some(extension) = item.extension("KHR_materials_transmission")? {
-        let share = extension.f32_or("transmissionFactor", 0.0)?;
-        material.transmission = share.clamp(0.0, 1.0);
-        textured = extension.get("transmissionTexture").is_some();
-    }
-    if let Some(extension) = item.extension("KHR_materials_volume")? {
-        material.has_volume = extension.f32_or("thicknessFactor", 0.0)? > 0.0;
-        let color = extension.f32s_or("attenuationColor", [1.0; 3])?;
-        material.attenuation_color = Vec3::from(color).clamp(Vec3::ZERO, Vec3::ONE);
-        // Absent means that nothing is attenuated; 0 and less are not allowed and read as absent.
-        material.attenuation_distance_m = match extension.f64("attenuationDistance")? {
-            Some(distance) if distance > 0.0 && (distance as f32).is_finite() => Some(distance as f32),
-            _ => None,
-        };
-    }
-    if let Some(extras) = item.get("extras")
-        && extras.get("volumePriority").is_some()
-    {
-        material.volume_priority = extras.f32_or("volumePriority", 0.0)?.clamp(0.0, 255.0) as u8;
-    }
+/// Smooth glass without further lobes has a mode of its own, with the exact Fresnel equations.
+fn shading_mode(item: &Item<'_>, material: &Material) -> Result<ShadingMode, Fault> {
     let smooth = material.roughness <= SMOOTH_ROUGHNESS && material.metallic_roughness_texture.is_none();
-    if item.extension("KHR_materials_unlit")?.is_some() {
-        material.mode = ShadingMode::Unlit;
-    } else if material.transmission > GLASS_TRANSMISSION && smooth && !textured {
-        material.mode = ShadingMode::Refractive;
-    }
-    Ok(())
-}
-
-/// A texture of a material; colours (`srgb`) are base colour and emissive.
-fn texture_use(
-    item: &Item<'_>,
-    key: &str,
-    srgb: bool,
-    textures: &mut TextureTable,
-) -> Result<Option<TextureUse>, Fault> {
-    let Some(info) = item.child(key)? else {
-        return Ok(None);
-    };
-    let index = info.required_index("index", textures.len(), "texture")?;
-    let mut tex_coord = info.size("texCoord")?.unwrap_or(0);
-    let mut texture_use = TextureUse::new(textures.want(index, srgb));
-    if let Some(transform) = info.extension("KHR_texture_transform")? {
-        texture_use.offset = Vec2::from(transform.f32s_or("offset", [0.0; 2])?);
-        texture_use.rotation_rad = transform.f32_or("rotation", 0.0)?;
-        texture_use.scale = Vec2::from(transform.f32s_or("scale", [1.0; 2])?);
-        tex_coord = transform.size("texCoord")?.unwrap_or(tex_coord);
-    }
-    // Meshes carry two sets; a third one falls back to the first.
-    texture_use.tex_coord = if tex_coord > 1 { 0 } else { tex_coord as u32 };
-    Ok(Some(texture_use))
+    let evenly_clear = material.transmission > GLASS_TRANSMISSION && material.transmission_texture.is_none();
+    Ok(if item.extension("KHR_materials_unlit")?.is_some() {
+        ShadingMode::Unlit
+    } else if evenly_clear && smooth && !material.has_scattering_lobe() {
+        ShadingMode::Refractive
+    } else {
+        ShadingMode::Pbr
+    })
 }

@@ -62,7 +62,7 @@ struct Neighbourhood {
 };
 
 // What one pixel holds of its past or present.
-struct Light {
+struct Signals {
     vec4 diffuse;       // a: history length, 0 for none
     vec4 specular;
     vec4 reflected;
@@ -70,7 +70,7 @@ struct Light {
     vec2 image_moments; // of reflected light
 };
 
-const Light NO_LIGHT = Light(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0));
+const Signals NO_SIGNALS = Signals(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec2(0.0));
 
 void add_moment(inout Moments moments, vec3 value) {
     moments.sum += value;
@@ -185,7 +185,7 @@ float tap_weight(Frame frame, Taps taps, int i, vec3 normal, out ivec2 p) {
 const float LEAST_WEIGHT = 1.0 / 64.0;
 
 // Direct light where the surface was: bilinear over the taps that saw it.
-void reproject_surface(Frame frame, uvec2 pixel, Seen seen, inout Light old) {
+void reproject_surface(Frame frame, uvec2 pixel, Seen seen, inout Signals old) {
     vec4 clip = frame.previous_clip_from_render * vec4(seen.previous, 1.0);
     Taps taps = taps_at(frame, vec2(pixel) + 0.5 - texelFetch(gbuffer_motion, ivec2(pixel), 0).xy);
     if (clip.w <= 0.0 || !taps.inside) {
@@ -193,7 +193,7 @@ void reproject_surface(Frame frame, uvec2 pixel, Seen seen, inout Light old) {
     }
     float depth = clip.z / clip.w;
     float tolerance = depth_tolerance(frame, depth, abs(dot(seen.geometric_normal, seen.direction)));
-    Light sum = NO_LIGHT;
+    Signals sum = NO_SIGNALS;
     float total = 0.0;
     for (int i = 0; i < 4; ++i) {
         ivec2 p;
@@ -229,7 +229,7 @@ float image_depth(Frame frame, Seen seen, float image_m) {
 }
 
 // Reflected light where its image was, from taps whose image was as far away.
-void reproject_image(Frame frame, uvec2 pixel, Seen seen, float image_m, inout Light old) {
+void reproject_image(Frame frame, uvec2 pixel, Seen seen, float image_m, inout Signals old) {
     vec3 now = image_position(seen, image_m);
     // An image moves with its surface only as far as the surface is all there is of it.
     vec3 moved = image_m > 0.0 ? vec3(0.0) : seen.previous - seen.position;
@@ -278,7 +278,7 @@ vec2 blend_moments(vec3 current, vec2 old, float length_frames) {
     return mix(old, vec2(l, l * l), 1.0 / max(length_frames, 1.0));
 }
 
-void store(Frame frame, ivec2 at, Light light, float depth) {
+void store(Frame frame, ivec2 at, Signals light, float depth) {
     imageStore(history_diffuse, at, light.diffuse);
     if (has_specular(frame)) {
         imageStore(history_specular, at, light.specular);
@@ -302,12 +302,12 @@ void main() {
     ivec2 at = ivec2(pixel);
     uvec4 id = texelFetch(gbuffer_id, at, 0);
     if (id.x == 0u) {
-        store(frame, at, NO_LIGHT, 0.0);
+        store(frame, at, NO_SIGNALS, 0.0);
         return;
     }
     Seen seen = seen_at(frame, scene, pixel, id);
     vec4 brought = HAS_REFLECTED ? texelFetch(reflected, at, 0) : vec4(0.0);
-    Light old = NO_LIGHT;
+    Signals old = NO_SIGNALS;
     if ((frame.flags & FRAME_HISTORY) != 0u) {
         reproject_surface(frame, pixel, seen, old);
         if (HAS_REFLECTED) {
@@ -331,7 +331,7 @@ void main() {
         specular = mean(neighbours.specular, neighbours.count);
         brought.rgb = mean(neighbours.reflected, neighbours.count);
     }
-    Light light;
+    Signals light;
     light.diffuse = blend(frame, diffuse, neighbours.diffuse, neighbours.count, old.diffuse);
     light.specular = blend(frame, specular, neighbours.specular, neighbours.count, old.specular);
     light.reflected = blend(frame, brought.rgb, neighbours.reflected, neighbours.count, old.reflected);

@@ -82,7 +82,11 @@ impl Targets {
             direct_specular: optional(light, "direct_specular", Format::Rgba32Float)?,
             history,
             shaded: make("shaded", Format::Rgba32Float)?,
-            ray_depth: or_one_texel(needs.ray_depth && (needs.paths || needs.secondary_rays()), "ray_depth", Format::R32Uint)?,
+            ray_depth: or_one_texel(
+                needs.ray_depth && (needs.paths || needs.secondary_rays()),
+                "ray_depth",
+                Format::R32Uint,
+            )?,
             light_shadow: None,
             display: make("display", Format::Rgba16Float)?,
             window: optional(window, "window", Format::Rgba16Float)?,

@@ -7,7 +7,7 @@ use super::Twin;
 twins! {
     /// A texture as a material uses it.
     struct TextureUse, size 32 {
-        /// Index into the bindless array, or [`NO_TEXTURE`].
+        /// Index into the bindless array, or [`NO_TEXTURE`](super::NO_TEXTURE).
         0 texture: u32,
         /// Texture coordinate set, 0 or 1.
         4 tex_coord: u32,

@@ -13,6 +13,8 @@ const NOT_SHOWN: Duration = Duration::from_millis(500);
 
 /// Endings of models.
 pub const MODEL_ENDINGS: [&str; 3] = ["gltf", "glb", "obj"];
+/// Endings of text files of spheres and boxes.
+pub const SHAPE_ENDINGS: [&str; 3] = ["xyz", "csv", "txt"];
 /// Endings of environment images.
 pub const ENVIRONMENT_ENDINGS: [&str; 2] = ["hdr", "exr"];
 /// Ending of projects.
@@ -23,7 +25,7 @@ pub const PROJECT_ENDING: &str = "caustica.json";
 pub enum Wish {
     /// A project or model to open as a new scene.
     Open,
-    /// A model to add to the scene.
+    /// A model, or spheres and boxes, to add to the scene.
     Import,
     /// An image to surround the scene.
     Environment,
@@ -43,8 +45,8 @@ impl Wish {
 
     fn filter(self) -> (&'static str, Vec<&'static str>) {
         match self {
-            Self::Open => ("Scenes", [&["json"][..], &MODEL_ENDINGS].concat()),
-            Self::Import => ("Models", MODEL_ENDINGS.to_vec()),
+            Self::Open => ("Scenes", [&["json"][..], &MODEL_ENDINGS, &SHAPE_ENDINGS].concat()),
+            Self::Import => ("Models", [MODEL_ENDINGS, SHAPE_ENDINGS].concat()),
             Self::Environment => ("Environments", ENVIRONMENT_ENDINGS.to_vec()),
             Self::SaveAs => ("Caustica projects", vec!["json"]),
         }

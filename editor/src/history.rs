@@ -182,7 +182,8 @@ fn changes_structure(edit: &Edit) -> bool {
         | Edit::SetMorphWeights { .. }
         | Edit::SetClip { .. }
         | Edit::SetRayVisibility { .. }
-        | Edit::SetPrimitiveTransform { .. } => false,
+        | Edit::SetPrimitiveTransform { .. }
+        | Edit::SetShapes { .. } => false,
         Edit::Batch { edits, .. } => edits.iter().any(changes_structure),
         _ => true,
     }

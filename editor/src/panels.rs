@@ -21,6 +21,7 @@ pub mod outliner;
 pub mod overlays;
 pub mod render;
 pub mod reports;
+pub mod shapes;
 pub mod timeline;
 pub mod view;
 pub mod view_input;
@@ -56,8 +57,9 @@ pub fn target_icon(cx: &Cx<'_>, target: Target) -> &'static str {
     if document.camera_of(target).is_some() {
         return icon::VIDEO_CAMERA;
     }
-    if document.mesh_of(target).is_some() {
-        return icon::CUBE;
+    if let Some(mesh) = document.mesh_of(target) {
+        let shapes = document.mesh(mesh).and_then(|mesh| mesh.shapes());
+        return shapes.map_or(icon::CUBE, |shapes| shapes::source_icon(shapes.source()));
     }
     match target.part {
         None if document.node(target.node).is_some_and(|node| node.prefab().is_some()) => icon::PACKAGE,

@@ -17,7 +17,7 @@ use caustica_renderer::gpu::{Device, Frames};
 use caustica_renderer::{
     AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings,
 };
-use caustica_scene::{Document, Edit, EditError, NodeId, ProjectMeta, Target};
+use caustica_scene::{Document, Edit, EditError, Local, NodeId, ProjectMeta, ShapeSource, Target};
 use glam::DVec3;
 
 pub use camera::ViewCamera;
@@ -178,6 +178,16 @@ impl Session {
         let (value, edit) = make(&mut self.document);
         self.push(edit)?;
         Ok(value)
+    }
+
+    /// Adds spheres and boxes with materials of their own, as one step; gives the new node.
+    ///
+    /// # Errors
+    /// When the description makes no shapes.
+    pub fn add_shapes(&mut self, name: &str, source: ShapeSource, local: Local) -> Result<NodeId, EditError> {
+        let (node, edit) = files::shapes_edit(&mut self.document, name, source, local)?;
+        self.push(edit)?;
+        Ok(node)
     }
 
     /// Ends a gesture: the next edit starts a step of its own.

@@ -141,8 +141,11 @@ fn source_of(snippet: &Snippet<'_>) -> Source {
     Source { file, texts }
 }
 
-/// A set 0 whose textures and environment are one white texel.
-fn empty_scene(device: &Arc<Device>, recorder: &mut caustica_gpu::Recorder) -> SceneSet {
+/// A set 0 whose textures and environment are one white texel; it has no TLAS yet.
+///
+/// # Panics
+/// When memory runs out.
+pub fn empty_scene(device: &Arc<Device>, recorder: &mut caustica_gpu::Recorder) -> SceneSet {
     let desc =
         ImageDesc { extent: [1, 1], format: Format::Rgba8Unorm, mip_levels: 1, usage: ImageUse::Texture };
     let white = Image::new(device, "white", desc).expect("an image");

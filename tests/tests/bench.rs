@@ -10,8 +10,7 @@ use serde_json::{Value, json};
 
 /// A quick run with validation on; the layer must be silent. Gives what the file holds.
 fn bench(folder: &Path, more: &[&str]) -> (Run, Value) {
-    let mut arguments =
-        vec!["bench", "--suite", "accel", "--quick", "--validation", "-o", "out/figures.json"];
+    let mut arguments = vec!["bench", "--quick", "--validation", "-o", "out/figures.json"];
     arguments.extend(more);
     let run = caustica(folder, &arguments);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
@@ -132,6 +131,27 @@ fn three_hundred_edits_taken_back_leave_the_device_as_it_was() {
     assert_eq!(soak["device"], json!({ "growth_bytes": 0, "steady": true }));
     // What the process holds is printed, not judged here: other tests share its allocator's moods.
     assert!(soak["process"]["growth_share"].is_f64() && soak["process"]["noise_share"].is_f64(), "{soak}");
+}
+
+#[test]
+fn a_cloud_is_measured_whole_and_in_every_pipeline() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (run, figures) = bench(folder.path(), &["--suite", "shapes"]);
+    assert!(figures.get("accel").is_none(), "one suite was asked for");
+    let [row] = rows(&figures["shapes"]["cloud"], "rows") else { unreachable!("one size in a quick run") };
+    assert_eq!(
+        (number(row, "count"), number(row, "shape_bytes"), number(row, "box_bytes")),
+        (2000, 56_000, 48_000)
+    );
+    assert!(row["build_ms"].as_f64() > Some(0.0) && row["boxes_ms"].as_f64() > Some(0.0), "{row}");
+    assert!(number(row, "blas_bytes") > 48_000, "{row}");
+    let pipelines: Vec<&Value> = rows(row, "frames").iter().map(|frame| &frame["pipeline"]).collect();
+    assert_eq!(pipelines, ["raster", "hybrid", "raytraced", "path"]);
+    assert!(
+        rows(row, "frames").iter().all(|frame| frame["device_ms"]["median"].as_f64() > Some(0.0)),
+        "{row}"
+    );
+    assert!(run.stdout.contains("each frame, device ms"), "{}", run.stdout);
 }
 
 #[test]

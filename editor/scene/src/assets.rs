@@ -7,6 +7,7 @@ mod light;
 mod lobes;
 mod material;
 mod mesh;
+mod shapes;
 mod texture;
 
 pub(crate) use deform::{Bounds, join, moved};
@@ -16,4 +17,7 @@ pub use light::{Camera, Light, LightKind, Projection};
 pub use lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, SpecularGlossiness};
 pub use material::{AlphaMode, Material, ShadingMode};
 pub use mesh::{Mesh, MeshData, Primitive};
+pub use shapes::{
+    Cloud, Distribution, MOST_SHAPES, Shape, ShapeFault, ShapeFile, ShapeKind, ShapeSource, Shapes,
+};
 pub use texture::{Sampler, Texture, TextureUse, Wrap};

@@ -7,7 +7,7 @@ use std::fmt;
 use glam::DAffine3;
 
 use crate::animation::ClipChoice;
-use crate::assets::{AlphaMode, Material, Mesh};
+use crate::assets::{AlphaMode, Material, Mesh, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
 use crate::import::geometry::has_no_area;
@@ -78,6 +78,7 @@ pub fn audit(document: &Document) -> Vec<Finding> {
     audit.transforms();
     for (id, mesh) in document.meshes() {
         audit.mesh(id, mesh);
+        audit.shapes(id, mesh);
     }
     for (id, material) in document.materials() {
         audit.material(id, material);
@@ -235,6 +236,25 @@ impl Audit<'_> {
         if outside > 0 {
             let message = format!("{outside} triangles name vertices that do not exist");
             self.add(Severity::Error, subject, &mesh.name, message);
+        }
+    }
+
+    fn shapes(&mut self, id: MeshId, mesh: &Mesh) {
+        let Some(shapes) = mesh.shapes() else { return };
+        let subject = Subject::Mesh(id);
+        if let ShapeSource::File(file) = shapes.source()
+            && file.shapes.is_none()
+        {
+            let message = format!("{} could not be read; put the file back", file.path.display());
+            self.add(Severity::Error, subject, &mesh.name, message);
+        } else if shapes.list().is_empty() {
+            let message = "there is not one sphere or box in it".to_owned();
+            self.add(Severity::Info, subject, &mesh.name, message);
+        }
+        let points = shapes.list().iter().filter(|shape| shape.half_extent.min_element() <= 0.0).count();
+        if points > 0 {
+            let message = format!("{points} spheres or boxes have no size and are not seen");
+            self.add(Severity::Warning, subject, &mesh.name, message);
         }
     }
 

@@ -20,6 +20,7 @@ use crate::transform::Local;
 mod apply;
 mod apply_animation;
 mod apply_prefab;
+mod apply_shapes;
 mod apply_tree;
 mod place;
 mod pose;

@@ -4,7 +4,7 @@
 use glam::DAffine3;
 
 use crate::animation::ClipChoice;
-use crate::assets::{Camera, Environment, Light, Material};
+use crate::assets::{Camera, Environment, Light, Material, Mesh, ShapeFault, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target};
 use crate::node::Subtree;
@@ -146,6 +146,26 @@ pub enum Edit {
         /// Its new place.
         mesh_from_primitive: DAffine3,
     },
+    /// Adds a mesh of spheres and boxes, which belongs to no prefab. [`Document::add_shapes_edit`] makes one, with materials
+    /// and a node.
+    AddMesh {
+        /// Its id, from [`Document::allocate_id`].
+        mesh: MeshId,
+        /// The mesh.
+        value: Box<Mesh>,
+    },
+    /// Removes a mesh that nothing places and no prefab has brought.
+    RemoveMesh {
+        /// Which mesh.
+        mesh: MeshId,
+    },
+    /// Describes the spheres and boxes of a mesh anew, in every instance. The number of primitives stays.
+    SetShapes {
+        /// Which mesh.
+        mesh: MeshId,
+        /// Their new description.
+        source: Box<ShapeSource>,
+    },
     /// Adds a prefab with its assets. [`Document::import_edit`] makes one.
     AddPrefab(Box<PrefabPackage>),
     /// Removes a prefab of which no instance is left, with its assets.
@@ -233,6 +253,12 @@ pub enum EditError {
         /// A user of it.
         by: String,
     },
+    /// The description makes no shapes.
+    #[error(transparent)]
+    NoShapes(#[from] ShapeFault),
+    /// The mesh holds triangles, or another number of primitives than these shapes have.
+    #[error("these shapes do not fit that mesh")]
+    OtherShapes,
     /// A node cannot hang below itself.
     #[error("a node cannot be moved into itself")]
     Cycle,
@@ -269,6 +295,10 @@ impl Edit {
                 |material| shown(&material.name, "material", id.0),
             )
         };
+        let mesh_name = |id: &MeshId| {
+            let name = document.mesh(*id).map_or("", |mesh| mesh.name.as_str());
+            shown(name, "mesh", id.0)
+        };
         match self {
             Self::SetTransform { target, .. } => format!("moved {}", name(target)),
             Self::Rename { target, name: new } => format!("renamed {} to {new}", name(target)),
@@ -300,9 +330,11 @@ impl Edit {
             Self::RemoveNode { node } => format!("removed {}", name(&Target::node(*node))),
             Self::Reparent { node, .. } => format!("regrouped {}", name(&Target::node(*node))),
             Self::SetPrimitiveTransform { mesh, primitive, .. } => {
-                let mesh_name = document.mesh(*mesh).map_or("", |m| m.name.as_str());
-                format!("moved primitive {primitive} of {}", shown(mesh_name, "mesh", mesh.0))
+                format!("moved primitive {primitive} of {}", mesh_name(mesh))
             }
+            Self::AddMesh { mesh, value } => format!("added {}", shown(&value.name, "mesh", mesh.0)),
+            Self::RemoveMesh { mesh } => format!("removed {}", mesh_name(mesh)),
+            Self::SetShapes { mesh, .. } => format!("reshaped {}", mesh_name(mesh)),
             Self::AddPrefab(package) => format!("imported {}", package.prefab.name),
             Self::RemovePrefab { prefab } => {
                 let prefab_name = document.prefab(*prefab).map_or("", |p| p.name.as_str());
@@ -328,6 +360,7 @@ impl Edit {
             | (Self::SetCamera { target: a, .. }, Self::SetCamera { target: b, .. }) => a == b,
             (Self::SetMaterial { material: a, .. }, Self::SetMaterial { material: b, .. }) => a == b,
             (Self::SetEnvironment(_), Self::SetEnvironment(_)) => true,
+            (Self::SetShapes { mesh: a, .. }, Self::SetShapes { mesh: b, .. }) => a == b,
             (
                 Self::SetPrimitiveTransform { mesh: a, primitive: p, .. },
                 Self::SetPrimitiveTransform { mesh: b, primitive: q, .. },

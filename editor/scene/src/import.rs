@@ -13,11 +13,13 @@ pub(crate) mod geometry;
 mod gltf;
 mod image;
 mod obj;
+mod shapes;
 mod tangents;
 mod uri;
 
 pub use environment::load_environment;
 pub use error::{ImportError, Warning};
+pub use shapes::load_shapes;
 
 /// What an import may be told.
 #[derive(Clone, Debug)]

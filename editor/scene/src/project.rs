@@ -16,8 +16,8 @@ mod read;
 mod record;
 mod write;
 
-/// Version of the format that is written, and the newest that is read.
-pub const SCHEMA_VERSION: u64 = 1;
+/// Version of the format that is written, and the newest that is read. 2: meshes of spheres and boxes.
+pub const SCHEMA_VERSION: u64 = 2;
 
 /// A project that was read.
 #[derive(Clone, Debug)]
@@ -47,6 +47,7 @@ struct Kept {
     nodes: BTreeMap<u64, Map<String, Value>>,
     prefabs: BTreeMap<u64, Map<String, Value>>,
     materials: BTreeMap<u64, Map<String, Value>>,
+    shapes: BTreeMap<u64, Map<String, Value>>,
     /// Moved primitives of meshes that are missing now, as they were in the file.
     meshes: Vec<record::MeshRecord>,
     /// The chosen camera when the part that it names is missing now.

@@ -23,6 +23,17 @@ pub enum NewLight {
     Sun,
 }
 
+/// Spheres and boxes that can be added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NewShapes {
+    /// A sphere.
+    Sphere,
+    /// A box.
+    Box,
+    /// Many of both.
+    Cloud,
+}
+
 /// Something to do.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
@@ -64,6 +75,8 @@ pub enum Action {
     AddGroup,
     /// Add a light.
     AddLight(NewLight),
+    /// Add spheres and boxes.
+    AddShapes(NewShapes),
     /// Add a camera that sees what the view sees.
     AddCamera,
     /// Place a prefab once more.
@@ -207,6 +220,9 @@ fn add() -> Vec<Command> {
     let add = |icon, name, action| command(Menu::Add, icon, name, action, None);
     vec![
         add(icon::FOLDER_SIMPLE, "Add group", Action::AddGroup),
+        add(icon::SPHERE, "Add sphere", Action::AddShapes(NewShapes::Sphere)),
+        add(icon::CUBE, "Add box", Action::AddShapes(NewShapes::Box)),
+        add(icon::DOTS_NINE, "Add cloud of spheres and boxes", Action::AddShapes(NewShapes::Cloud)),
         add(icon::LIGHTBULB, "Add point light", Action::AddLight(NewLight::Point)),
         add(icon::FLASHLIGHT, "Add spot light", Action::AddLight(NewLight::Spot)),
         add(icon::SUN, "Add sun", Action::AddLight(NewLight::Sun)),

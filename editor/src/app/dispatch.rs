@@ -1,12 +1,12 @@
 //! Carries out actions. Enters: an action. Leaves: edits pushed to the session, a moved camera, changed memory.
 
 use caustica_scene::{
-    Camera, Edit, Environment, Light, LightKind, Local, Node, NodeId, NodeKind, PrefabId, Projection, Target,
-    Trs,
+    Camera, Cloud, Edit, Environment, Light, LightKind, Local, Node, NodeId, NodeKind, PrefabId, Projection,
+    ShapeSource, Target, Trs,
 };
 use glam::{DQuat, DVec3, Vec3};
 
-use super::actions::{Action, NewLight};
+use super::actions::{Action, NewLight, NewShapes};
 use super::editor::{Editor, Then};
 use super::files::Purpose;
 use crate::camera_control::{AxisView, Pose, framing_projection};
@@ -44,6 +44,7 @@ impl Editor {
             Action::Group => self.group(),
             Action::AddGroup => self.add(Node::new("Group", NodeKind::Group)),
             Action::AddLight(kind) => self.add_light(kind),
+            Action::AddShapes(shapes) => self.add_shapes(shapes),
             Action::AddCamera => self.add_camera(),
             Action::AddInstance(prefab) => self.add_instance(prefab),
             Action::FrameSelection | Action::FrameAll => self.frame(action == Action::FrameSelection),
@@ -301,6 +302,30 @@ impl Editor {
             && document.effective_environment() == Environment::DefaultSky;
         let sky = keeps_sky.then_some(Edit::SetEnvironment(Environment::DefaultSky));
         self.add_with(node, sky);
+    }
+
+    /// As large as is handy in the view, on no floor in particular.
+    fn add_shapes(&mut self, shapes: NewShapes) {
+        let at = self.place_in_view();
+        let size = (self.state.view.distance_m * 0.15) as f32;
+        let (name, source) = match shapes {
+            NewShapes::Sphere => ("Sphere", ShapeSource::Sphere { centre: Vec3::ZERO, radius_m: size }),
+            NewShapes::Box => {
+                ("Box", ShapeSource::Box { centre: Vec3::ZERO, half_extent_m: Vec3::splat(size) })
+            }
+            NewShapes::Cloud => {
+                let radius_m = [0.01 * size, 0.04 * size];
+                let cloud = Cloud { half_extent_m: Vec3::splat(2.0 * size), radius_m, ..Cloud::default() };
+                ("Cloud", ShapeSource::Cloud(cloud))
+            }
+        };
+        let name = self.free_name(name);
+        let trs = Trs::from_translation(at);
+        let added = self.session.add_shapes(&name, source, trs.into());
+        match added {
+            Ok(id) => self.selected_new(id),
+            Err(error) => self.state.toasts.error(format!("That cannot be added: {error}.")),
+        }
     }
 
     fn add_camera(&mut self) {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::editor::{Editor, Then};
-use crate::dialogs::{ENVIRONMENT_ENDINGS, MODEL_ENDINGS, PROJECT_ENDING, Wish};
+use crate::dialogs::{ENVIRONMENT_ENDINGS, MODEL_ENDINGS, PROJECT_ENDING, SHAPE_ENDINGS, Wish};
 use crate::session::{self, Loaded};
 use crate::worker::{Answer, Job, Progress};
 
@@ -72,7 +72,7 @@ impl Editor {
     /// A file was dropped on the window.
     pub(super) fn drop_file(&mut self, path: PathBuf) {
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-        if MODEL_ENDINGS.contains(&ending.as_str()) || ENVIRONMENT_ENDINGS.contains(&ending.as_str()) {
+        if [&MODEL_ENDINGS[..], &SHAPE_ENDINGS, &ENVIRONMENT_ENDINGS].concat().contains(&ending.as_str()) {
             self.load(Purpose::Import, path);
         } else if ending == "json" {
             self.guarded(Then::Open(path));
@@ -235,7 +235,7 @@ fn warning_count(loaded: &Loaded) -> usize {
     match loaded {
         Loaded::Project(project) => project.warnings.len(),
         Loaded::Model(model) => model.warnings.len(),
-        Loaded::Environment(..) => 0,
+        Loaded::Shapes(..) | Loaded::Environment(..) => 0,
     }
 }
 

@@ -1,6 +1,7 @@
 //! `caustica bench`: what the program costs on this machine and device. Enters: a suite. Leaves: tables on standard output
 //! and one JSON object in a file. It measures and never judges: no exit code depends on a time.
 
+mod cloud;
 mod crowd;
 mod edits;
 mod machine;
@@ -41,7 +42,11 @@ struct Part {
     run: fn(&Bench) -> anyhow::Result<Measured>,
 }
 
-const SUITES: [Suite; 1] = [Suite {
+const SUITES: [Suite; 2] = [ACCEL, SHAPES];
+
+const SHAPES: Suite = Suite { name: "shapes", parts: &[Part { name: "cloud", run: cloud::run }] };
+
+const ACCEL: Suite = Suite {
     name: "accel",
     parts: &[
         // First, while the process is small: memory that others gave back to the allocator would hide what is lost here.
@@ -50,7 +55,7 @@ const SUITES: [Suite; 1] = [Suite {
         Part { name: "structures", run: structures::run },
         Part { name: "skinned", run: skinned::run },
     ],
-}];
+};
 
 /// Arguments of `caustica bench`.
 #[derive(Args, Debug)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use caustica_scene::{Document, Severity, audit};
+use caustica_scene::{Document, Mesh, Severity, ShapeSource, audit};
 use clap::Args;
 use serde_json::json;
 
@@ -13,7 +13,7 @@ use crate::session::{Loaded, load};
 /// Arguments of `caustica check`.
 #[derive(Args, Debug)]
 pub(super) struct CheckArgs {
-    /// A project, .gltf, .glb or .obj
+    /// A project, .gltf, .glb, .obj, or a text file of spheres and boxes
     file: PathBuf,
     /// Print one JSON object
     #[arg(long)]
@@ -32,14 +32,27 @@ pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             document.apply(place)?;
             (document, warnings)
         }
+        Loaded::Shapes(file) => {
+            let mut document = Document::new();
+            let (_, edit) = document.add_shapes_edit(
+                "shapes",
+                ShapeSource::File(file),
+                &[],
+                caustica_scene::Local::default(),
+            )?;
+            document.apply(edit)?;
+            (document, Vec::new())
+        }
         Loaded::Environment(..) => {
             anyhow::bail!("{}: an environment has no scene to check", args.file.display())
         }
     };
     let findings = audit(&document);
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
-    let triangles: usize =
-        document.renderables().filter_map(|r| document.mesh(r.mesh).map(|mesh| mesh.triangle_count())).sum();
+    let placed = |count: fn(&Mesh) -> usize| -> usize {
+        document.renderables().filter_map(|r| document.mesh(r.mesh).map(count)).sum()
+    };
+    let (triangles, shapes) = (placed(Mesh::triangle_count), placed(Mesh::shape_count));
     if args.json {
         let list: Vec<_> = findings
             .iter()
@@ -54,6 +67,7 @@ pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
                 "findings": list,
                 "import_warnings": warnings,
                 "triangles": triangles,
+                "shapes": shapes,
                 "materials": document.materials().count(),
                 "textures": document.textures().count(),
             })
@@ -63,7 +77,7 @@ pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             say!("{:?}: {}", finding.severity, finding.message);
         }
         say!(
-            "{}: {triangles} triangles, {} materials, {} textures, {} import warnings, {} findings, {errors} errors",
+            "{}: {triangles} triangles, {shapes} spheres and boxes, {} materials, {} textures, {} import warnings, {} findings, {errors} errors",
             args.file.display(),
             document.materials().count(),
             document.textures().count(),

@@ -29,6 +29,7 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         section(ui, "Camera", |ui| camera_ui(cx, ui, target, camera));
     }
     if cx.session.document().mesh_of(target).is_some() {
+        super::shapes::ui(cx, ui, target);
         super::mesh::ui(cx, ui, target);
         super::material::ui(cx, ui, target);
     }
@@ -160,21 +161,21 @@ fn uniform(old: DVec3, new: DVec3) -> DVec3 {
 }
 
 /// Three numbers in a row below their name.
-struct VectorField<'a> {
-    name: &'a str,
-    tip: &'a str,
+pub(super) struct VectorField<'a> {
+    pub(super) name: &'a str,
+    pub(super) tip: &'a str,
     /// Of a drag, a point.
-    speed: f64,
-    decimals: usize,
-    suffix: &'a str,
-    neutral: DVec3,
+    pub(super) speed: f64,
+    pub(super) decimals: usize,
+    pub(super) suffix: &'a str,
+    pub(super) neutral: DVec3,
     /// A clip sets it: what is typed shows at rest only.
-    driven: bool,
+    pub(super) driven: bool,
 }
 
 impl VectorField<'_> {
     /// Gives the numbers when one was changed.
-    fn ui(&self, ui: &mut Ui, value: DVec3) -> Option<DVec3> {
+    pub(super) fn ui(&self, ui: &mut Ui, value: DVec3) -> Option<DVec3> {
         let mut edited = value;
         let mut changed = false;
         ui.horizontal(|ui| {

@@ -299,11 +299,10 @@ fn own_copy(
 
 fn mesh_facts(cx: &Cx<'_>, ui: &mut Ui, id: caustica_scene::MeshId) {
     let Some(mesh) = cx.session.document().mesh(id) else { return };
-    let facts = format!(
-        "{} triangles, {} vertices, {} primitives",
-        mesh.triangle_count(),
-        mesh.data.positions.len(),
-        mesh.primitives.len()
-    );
+    let elements = match mesh.shapes() {
+        Some(_) => format!("{} spheres and boxes", mesh.shape_count()),
+        None => format!("{} triangles, {} vertices", mesh.triangle_count(), mesh.data.positions.len()),
+    };
+    let facts = format!("{elements}, {} primitives", mesh.primitives.len());
     ui.label(RichText::new(facts).small().weak()).on_hover_text("Of the mesh that this object places");
 }

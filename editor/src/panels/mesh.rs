@@ -113,16 +113,16 @@ fn primitives(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
         for index in range {
             let material = renderable.materials.get(index).and_then(|id| document.material(*id));
             let name = material.map_or("", |material| material.name.as_str());
-            let triangles = triangles_of(document, target, index);
+            let elements = elements_of(document, target, index);
             let index = index as u32;
             let text = format!("{}  {index}  {name}", icon::TRIANGLE);
             let button = Button::new(text)
-                .right_text(RichText::new(format!("{triangles}")).weak().small())
+                .right_text(RichText::new(format!("{elements}")).weak().small())
                 .selected(chosen == Some(index))
                 .frame_when_inactive(chosen == Some(index))
                 .truncate()
                 .min_size(egui::vec2(ui.available_width(), ROW));
-            let tip = "Triangles of one material. Click to move it inside its mesh; a double click in the view does the same";
+            let tip = "What has one material: triangles, or spheres and boxes. Click to move it inside its mesh; a double click in the view does the same";
             if ui.add(button).on_hover_text(tip).clicked() {
                 chosen = if chosen == Some(index) { None } else { Some(index) };
             }
@@ -138,9 +138,11 @@ fn primitives(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     }
 }
 
-fn triangles_of(document: &Document, target: Target, index: usize) -> u32 {
-    let mesh = document.mesh_of(target).and_then(|id| document.mesh(id));
-    mesh.and_then(|mesh| mesh.primitives.get(index)).map_or(0, |primitive| primitive.index_count / 3)
+/// Number of triangles, or of spheres and boxes, of a primitive.
+fn elements_of(document: &Document, target: Target, index: usize) -> u32 {
+    let Some(mesh) = document.mesh_of(target).and_then(|id| document.mesh(id)) else { return 0 };
+    let corners = if mesh.shapes().is_some() { 1 } else { 3 };
+    mesh.primitives.get(index).map_or(0, |primitive| primitive.index_count / corners)
 }
 
 /// The place of the selected primitive inside its mesh.

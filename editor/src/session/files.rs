@@ -8,8 +8,10 @@ use anyhow::{Context, bail};
 use caustica_renderer::ViewSettings;
 use caustica_scene::import::{self, ImportOptions, Imported};
 use caustica_scene::{
-    Document, Edit, Environment, EnvironmentFile, Local, NodeId, Project, ProjectMeta, RadianceMap,
+    Document, Edit, Environment, EnvironmentFile, Local, Material, NodeId, Project, ProjectMeta, RadianceMap,
+    ShapeFault, ShapeFile, ShapeSource,
 };
+use glam::Vec4;
 
 use super::camera::ViewCamera;
 
@@ -23,11 +25,13 @@ pub enum Loaded {
     Project(Box<Project>),
     /// A model: glTF, GLB or OBJ.
     Model(Box<Imported>),
+    /// Spheres and boxes of a text file.
+    Shapes(ShapeFile),
     /// An environment map.
     Environment(PathBuf, Arc<RadianceMap>),
 }
 
-/// Reads a project, a model or an environment, by the ending of its name. `progress`: step and share done.
+/// Reads a project, a model, spheres and boxes, or an environment, by the ending of its name. `progress`: step and share done.
 ///
 /// # Errors
 /// When the file cannot be read, with file, place and reason.
@@ -44,13 +48,15 @@ pub fn load(path: &Path, progress: &dyn Fn(&str, f32)) -> anyhow::Result<Loaded>
             imported.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
             Ok(Loaded::Model(Box::new(imported)))
         }
+        "xyz" | "csv" | "txt" => Ok(Loaded::Shapes(import::load_shapes(path)?)),
         "hdr" | "exr" => {
             let (map, warnings) = import::load_environment(path)?;
             warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
             Ok(Loaded::Environment(path.to_owned(), Arc::new(map)))
         }
         _ => bail!(
-            "{}: neither a project (.caustica.json) nor a model (.gltf, .glb, .obj) nor an environment (.hdr, .exr)",
+            "{}: neither a project (.caustica.json) nor a model (.gltf, .glb, .obj) nor spheres and boxes (.xyz, .csv, .txt) \
+             nor an environment (.hdr, .exr)",
             path.display()
         ),
     }
@@ -114,11 +120,37 @@ pub(super) fn import(document: &mut Document, loaded: Loaded) -> anyhow::Result<
             }
             Ok(Brought { edit: Edit::batch(format!("imported {name}"), vec![add, place]), node: Some(node) })
         }
+        Loaded::Shapes(file) => {
+            let name =
+                file.path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+            let source = ShapeSource::File(file);
+            let (node, edit) = shapes_edit(document, &name, source, Local::default())?;
+            Ok(Brought { edit, node: Some(node) })
+        }
         Loaded::Environment(path, map) => {
             let file = EnvironmentFile { path, rotation_rad: 0.0, scale: 1.0, map: Some(map) };
             Ok(Brought { edit: Edit::SetEnvironment(Environment::File(file)), node: None })
         }
     }
+}
+
+/// The edit that adds spheres and boxes in two plain colours, blue and orange, and the new node's id.
+pub(super) fn shapes_edit(
+    document: &mut Document,
+    name: &str,
+    source: ShapeSource,
+    local: Local,
+) -> Result<(NodeId, Edit), ShapeFault> {
+    let colours = [Vec4::new(0.12, 0.3, 0.62, 1.0), Vec4::new(0.8, 0.35, 0.08, 1.0)];
+    let material = |(number, base_color): (usize, &Vec4)| Material {
+        name: format!("{name} {}", number + 1),
+        base_color: *base_color,
+        metallic: 0.0,
+        roughness: 0.5,
+        ..Material::default()
+    };
+    let materials: Vec<Material> = colours.iter().enumerate().map(material).collect();
+    document.add_shapes_edit(name, source, &materials, local)
 }
 
 /// Writes camera and settings into what is saved.

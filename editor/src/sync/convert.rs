@@ -58,7 +58,7 @@ pub fn mesh_of(mesh: &scene::Mesh) -> delta::Mesh {
         tex_coords1: data.tex_coords1.clone(),
         colors: data.colors.clone(),
         indices: data.indices.clone(),
-        shapes: Vec::new(),
+        shapes: mesh.shapes().map_or_else(Vec::new, |shapes| shapes.list().iter().map(shape_of).collect()),
         geometries: mesh
             .primitives
             .iter()
@@ -70,6 +70,14 @@ pub fn mesh_of(mesh: &scene::Mesh) -> delta::Mesh {
             .collect(),
         deformation: super::deform::deformation_of(mesh),
     }
+}
+
+fn shape_of(shape: &scene::Shape) -> delta::Shape {
+    let kind = match shape.kind {
+        scene::ShapeKind::Sphere => delta::ShapeKind::Sphere,
+        scene::ShapeKind::Box => delta::ShapeKind::Box,
+    };
+    delta::Shape { kind, centre: shape.centre, half_extent: shape.half_extent }
 }
 
 /// A texture.

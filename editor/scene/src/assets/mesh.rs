@@ -1,4 +1,4 @@
-//! Meshes: shared vertices, cut into primitives.
+//! Meshes: shared vertices, or spheres and boxes, cut into primitives.
 //! Plain data with bounds; knows no file format and no device.
 
 use std::sync::Arc;
@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
 use super::deform::{Bounds, DeformPose, MorphTarget, Reach, SkinData, join, moved};
+use super::shapes::{ShapeFault, ShapeSource, Shapes};
 use crate::ids::MaterialId;
 
 /// Vertices and indices. All arrays but `tex_coords1` and `colors` hold one entry a vertex; those two
@@ -34,16 +35,18 @@ pub struct MeshData {
     pub morph: Vec<MorphTarget>,
 }
 
-/// A mesh: shared vertices, cut into primitives.
+/// A mesh: shared vertices, or spheres and boxes, cut into primitives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     /// Shown in the outliner.
     pub name: String,
-    /// Vertices and indices.
+    /// Vertices and indices; none in a mesh of shapes.
     pub data: Arc<MeshData>,
-    /// Ranges of the indices.
+    /// Spheres and boxes; `None`: a mesh of triangles.
+    shapes: Option<Shapes>,
+    /// Ranges of the indices, or of the shapes.
     pub primitives: Vec<Primitive>,
-    /// Smallest and largest corner in mesh space, primitive transforms included; `None` without triangles. They are those of
+    /// Smallest and largest corner in mesh space, primitive transforms included; `None` without triangles or shapes. They are those of
     /// the boxes of the primitives: never too small, and too large where one is turned.
     pub bounds: Option<(DVec3, DVec3)>,
     /// Weights of the morph targets unless a node, part or clip says otherwise, one a target.
@@ -54,12 +57,12 @@ pub struct Mesh {
     reach: Vec<Reach>,
 }
 
-/// A range of a mesh's indices with one material.
+/// A range of a mesh's indices, or of its shapes, with one material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Primitive {
-    /// First index, a multiple of 3.
+    /// First index, a multiple of 3; or first shape.
     pub first_index: u32,
-    /// Number of indices, a multiple of 3.
+    /// Number of indices, a multiple of 3; or of shapes.
     pub index_count: u32,
     /// Material unless the node or part says otherwise.
     pub material: MaterialId,
@@ -72,14 +75,66 @@ impl Mesh {
     pub fn new(name: String, data: Arc<MeshData>, primitives: Vec<Primitive>) -> Self {
         let default_weights = vec![0.0; data.morph.len()];
         let (own_bounds, reach) = (Vec::new(), Vec::new());
-        let mut mesh = Self { name, data, primitives, bounds: None, default_weights, own_bounds, reach };
-        mesh.own_bounds = mesh.primitives.iter().map(|primitive| mesh.corners_of(primitive)).collect();
+        let shapes = None;
+        let mut mesh = Self { name, data, shapes, primitives, bounds: None, default_weights, own_bounds, reach };
+        mesh.measure();
         mesh.update_bounds();
         if mesh.data.skin.is_some() || !mesh.data.morph.is_empty() {
             let reach = |primitive| Reach::of(&mesh.data, mesh.indices_of(primitive));
             mesh.reach = mesh.primitives.iter().map(reach).collect();
         }
         mesh
+    }
+
+    /// A mesh of spheres and boxes. Its primitives take the materials in turn; the last goes on for the rest.
+    ///
+    /// # Errors
+    /// When the description makes no shapes.
+    pub fn of_shapes(
+        name: String,
+        source: ShapeSource,
+        materials: &[MaterialId],
+    ) -> Result<Self, ShapeFault> {
+        let shapes = Shapes::new(source)?;
+        let last = materials.last().copied().unwrap_or_default();
+        let chosen = materials.iter().copied().chain(std::iter::repeat(last));
+        let primitive = |((first_index, index_count), material)| Primitive {
+            first_index,
+            index_count,
+            material,
+            mesh_from_primitive: DAffine3::IDENTITY,
+        };
+        let primitives = shapes.ranges().into_iter().zip(chosen).map(primitive).collect();
+        let mut mesh = Self::new(name, Arc::default(), primitives);
+        mesh.shapes = Some(shapes);
+        mesh.measure();
+        Ok(mesh)
+    }
+
+    /// Its spheres and boxes; `None`: a mesh of triangles.
+    pub fn shapes(&self) -> Option<&Shapes> {
+        self.shapes.as_ref()
+    }
+
+    /// Puts other shapes in the place of those that are there and gives back their description. Materials and places of
+    /// the primitives stay. `None`, and nothing happens, without shapes and for another number of primitives.
+    pub(crate) fn replace_shapes(&mut self, shapes: Shapes) -> Option<ShapeSource> {
+        let old = self.shapes.as_mut()?;
+        let ranges = shapes.ranges();
+        if ranges.len() != self.primitives.len() {
+            return None;
+        }
+        let old = std::mem::replace(old, shapes);
+        for (primitive, (first, count)) in self.primitives.iter_mut().zip(ranges) {
+            (primitive.first_index, primitive.index_count) = (first, count);
+        }
+        self.measure();
+        Some(old.source().clone())
+    }
+
+    fn measure(&mut self) {
+        self.own_bounds = self.primitives.iter().map(|primitive| self.corners_of(primitive)).collect();
+        self.update_bounds();
     }
 
     /// Computes `bounds` again, as after a primitive moved. Costs the primitives, not the vertices.
@@ -97,12 +152,15 @@ impl Mesh {
         self.reach.iter().zip(&self.primitives).filter_map(posed).reduce(join)
     }
 
-    /// Smallest and largest corner of one primitive, primitive space; `None` without triangles.
+    /// Smallest and largest corner of one primitive, primitive space; `None` without triangles or shapes.
     pub fn primitive_bounds(&self, primitive: usize) -> Option<(DVec3, DVec3)> {
         self.own_bounds.get(primitive).copied().flatten()
     }
 
     fn corners_of(&self, primitive: &Primitive) -> Option<Bounds> {
+        if let Some(shapes) = &self.shapes {
+            return shapes.bounds((primitive.first_index, primitive.index_count));
+        }
         let corner = |&index: &u32| self.data.positions.get(index as usize).map(|p| p.as_dvec3());
         self.indices_of(primitive).iter().filter_map(corner).map(|p| (p, p)).reduce(join)
     }
@@ -116,6 +174,11 @@ impl Mesh {
 
     /// Number of triangles of all primitives.
     pub fn triangle_count(&self) -> usize {
-        self.primitives.iter().map(|p| p.index_count as usize / 3).sum()
+        self.primitives.iter().map(|primitive| self.indices_of(primitive).len() / 3).sum()
+    }
+
+    /// Number of spheres and boxes of all primitives.
+    pub fn shape_count(&self) -> usize {
+        self.shapes.as_ref().map_or(0, |shapes| shapes.list().len())
     }
 }

@@ -1,5 +1,5 @@
 //! Carries out edits of values and hands back what undoes them.
-//! Edits of the tree are in `apply_tree.rs`, those of prefabs in `apply_prefab.rs`.
+//! Edits of the tree are in `apply_tree.rs`, those of prefabs in `apply_prefab.rs`, of shapes in `apply_shapes.rs`.
 
 use super::Document;
 use crate::assets::{Camera, Environment, Light, Material, TextureUse};
@@ -66,6 +66,9 @@ impl Document {
             Edit::SetPrimitiveTransform { mesh, primitive, mesh_from_primitive } => {
                 self.set_primitive_transform(mesh, primitive, mesh_from_primitive)
             }
+            Edit::AddMesh { mesh, value } => self.add_mesh(mesh, *value),
+            Edit::RemoveMesh { mesh } => self.remove_mesh(mesh),
+            Edit::SetShapes { mesh, source } => self.set_shapes(mesh, *source),
             Edit::AddPrefab(package) => self.add_prefab(*package),
             Edit::RemovePrefab { prefab } => self.remove_prefab(prefab),
             Edit::ReplacePrefab(package) => self.replace_prefab(*package),

@@ -10,9 +10,10 @@ use serde_json::Value;
 use super::paths::from_relative;
 use super::record::{
     CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, PrefabRecord, ProjectRecord,
+    ShapesRecord,
 };
 use super::{Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION};
-use crate::assets::{Environment, EnvironmentFile, Material, Mesh, MeshData};
+use crate::assets::{Environment, EnvironmentFile, Material, Mesh, MeshData, ShapeFile, ShapeSource};
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
 use crate::ids::Target;
@@ -45,6 +46,9 @@ pub(super) fn load(
     }
     for material in record.materials {
         loader.add_material(material)?;
+    }
+    for shapes in record.shapes {
+        loader.add_shapes(shapes)?;
     }
     for mesh in record.meshes {
         loader.move_primitives(mesh);
@@ -130,6 +134,29 @@ impl Loader<'_> {
             Edit::AddMaterial { material: id, entry: Box::new(entry) }
         };
         self.apply(edit)
+    }
+
+    /// Spheres and boxes are made anew from their description. A file that is missing is kept on save.
+    fn add_shapes(&mut self, record: ShapesRecord) -> Result<(), ProjectProblem> {
+        let ShapesRecord { id, name, source, materials, other } = record;
+        if !other.is_empty() {
+            self.meta.kept.shapes.insert(id.0, other);
+        }
+        let source = match source {
+            ShapeSource::File(file) => {
+                let path = from_relative(self.path, &file.path.to_string_lossy());
+                let read = import::load_shapes(&path).or_else(|error| {
+                    self.warn(format!("shapes {name}"), format!("{error}; nothing stands in its place"));
+                    Ok::<_, ProjectProblem>(ShapeFile { path, shapes: None })
+                });
+                ShapeSource::File(read?)
+            }
+            other => other,
+        };
+        let problem = |reason: String| ProjectProblem::Broken(format!("shapes {}: {reason}", id.0));
+        let value = Mesh::of_shapes(name, source, &materials).map_err(|fault| problem(fault.to_string()))?;
+        let edit = Edit::AddMesh { mesh: id, value: Box::new(value) };
+        self.document.apply(edit).map(|_| ()).map_err(|error| problem(error.to_string()))
     }
 
     fn without_lost_textures(&mut self, mut material: Material) -> Material {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::animation::ClipChoice;
-use crate::assets::{Camera, Light, Material};
+use crate::assets::{Camera, Light, Material, ShapeSource};
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, TextureId};
 use crate::node::RayVisibility;
 use crate::prefab::{PartOverride, PartPath};
@@ -27,6 +27,9 @@ pub(super) struct ProjectRecord {
     /// Edited materials of prefabs, and materials made in the program.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub materials: Vec<MaterialRecord>,
+    /// Meshes of spheres and boxes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<ShapesRecord>,
     /// Meshes with moved primitives.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub meshes: Vec<MeshRecord>,
@@ -55,8 +58,9 @@ impl ProjectRecord {
             meshes.chain(materials).chain(textures).chain([prefab.id.0])
         });
         let materials = self.materials.iter().map(|material| material.id.0);
+        let shapes = self.shapes.iter().map(|shapes| shapes.id.0);
         let nodes = self.nodes.iter().map(|node| node.id.0);
-        prefabs.chain(materials).chain(nodes).max().unwrap_or(0)
+        prefabs.chain(materials).chain(shapes).chain(nodes).max().unwrap_or(0)
     }
 }
 
@@ -82,6 +86,20 @@ pub(super) struct PrefabRecord {
 pub(super) struct MaterialRecord {
     pub id: MaterialId,
     pub value: Material,
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+/// A mesh of spheres and boxes: how they are made, never the shapes themselves.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ShapesRecord {
+    pub id: MeshId,
+    pub name: String,
+    /// The path of a file is relative to the project, with forward slashes.
+    pub source: ShapeSource,
+    /// One a primitive.
+    #[serde(default)]
+    pub materials: Vec<MaterialId>,
     #[serde(flatten)]
     pub other: Map<String, Value>,
 }

@@ -1,7 +1,7 @@
 //! A document as the text of a project file.
 //! In: document and meta. Out: JSON with a fixed order of keys: the same scene gives the same bytes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::DAffine3;
@@ -10,13 +10,13 @@ use serde_json::{Map, Value};
 use super::paths::to_relative;
 use super::record::{
     CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, OverrideRecord, PrefabRecord,
-    ProjectRecord,
+    ProjectRecord, ShapesRecord,
 };
 use super::{ProjectMeta, SCHEMA_VERSION};
 use crate::animation::ClipChoice;
-use crate::assets::Environment;
+use crate::assets::{Environment, Mesh, ShapeFile, ShapeSource};
 use crate::document::Document;
-use crate::ids::NodeId;
+use crate::ids::{MeshId, NodeId};
 use crate::node::{Node, NodeKind};
 
 /// The text of a project that will stand at `path`.
@@ -30,6 +30,7 @@ pub(super) fn to_text(
         next_id: document.next_id(),
         prefabs: prefabs(path, document, meta),
         materials: materials(document, meta),
+        shapes: shapes(path, document, meta),
         meshes: meshes(document, meta),
         nodes: nodes(document, meta),
         environment: environment(path, document),
@@ -72,6 +73,28 @@ fn materials(document: &Document, meta: &ProjectMeta) -> Vec<MaterialRecord> {
             other: kept(&meta.kept.materials, id.0),
         })
         .collect()
+}
+
+/// Only those that are placed: a mesh whose nodes are gone is there for undo alone.
+fn shapes(path: &Path, document: &Document, meta: &ProjectMeta) -> Vec<ShapesRecord> {
+    let placed: BTreeSet<_> = document.nodes().filter_map(|(id, _)| document.mesh_of(id.into())).collect();
+    let record = |(id, mesh): (MeshId, &Mesh)| {
+        let source = match mesh.shapes()?.source().clone() {
+            ShapeSource::File(file) => {
+                ShapeSource::File(ShapeFile { path: to_relative(path, &file.path).into(), ..file })
+            }
+            other => other,
+        };
+        let materials = mesh.primitives.iter().map(|primitive| primitive.material).collect();
+        Some(ShapesRecord {
+            id,
+            name: mesh.name.clone(),
+            source,
+            materials,
+            other: kept(&meta.kept.shapes, id.0),
+        })
+    };
+    document.meshes().filter(|(id, _)| placed.contains(id)).filter_map(record).collect()
 }
 
 fn meshes(document: &Document, meta: &ProjectMeta) -> Vec<MeshRecord> {

@@ -18,5 +18,6 @@ mod oracle;
 mod projects;
 mod rig_damage;
 mod rig_import;
+mod shapes;
 mod speed;
 mod transforms;

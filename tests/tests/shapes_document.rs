@@ -12,7 +12,8 @@ use caustica_tests::gpu::{self, session};
 use caustica_tests::program::caustica;
 use glam::{DAffine3, DVec3, Vec3};
 
-const EXTENT: [u32; 2] = [64, 48];
+// Odd, so that the middle pixel looks along the axis.
+const EXTENT: [u32; 2] = [65, 49];
 
 fn new_session(gpu: &gpu::Session) -> Session {
     let settings = ViewSettings { pipeline: Pipeline::Raytraced, jitter: false, ..ViewSettings::default() };

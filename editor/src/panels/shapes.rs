@@ -7,7 +7,7 @@ use caustica_scene::{Cloud, Distribution, Edit, MOST_SHAPES, ShapeSource, Target
 use egui::emath::Numeric;
 use egui::{DragValue, RichText, Slider, Ui};
 use egui_phosphor::regular as icon;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::inspector::VectorField;
 use super::{Cx, field, section};

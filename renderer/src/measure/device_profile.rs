@@ -101,7 +101,7 @@ impl DeviceProfile {
         let [blas_build_ms, blas_fast_build_ms, blas_refit_ms, tlas_build_ms, tlas_refit_ms, compacted_share] =
             match kind {
                 DeviceKind::Cpu => [4.7, 4.7, 4.7, 9.0, 9.0, 1.0],
-                _ => [0.49, 0.49, 0.09, 0.41, 0.05, 0.86],
+                _ => [0.49, 0.30, 0.09, 0.41, 0.05, 0.86],
             };
         Self {
             format: FORMAT,

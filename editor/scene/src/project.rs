@@ -61,7 +61,6 @@ pub struct ProjectError {
     /// The project file.
     pub file: PathBuf,
     /// What is wrong.
-    #[source]
     pub problem: ProjectProblem,
 }
 

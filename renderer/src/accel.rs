@@ -46,7 +46,7 @@ pub(crate) struct Accel {
 }
 
 /// So many frames after memory did not suffice for background work it is tried again.
-const TRY_AGAIN_FRAMES: u64 = 600;
+const TRY_AGAIN_FRAMES: u64 = 60;
 
 impl Accel {
     /// # Errors
@@ -203,7 +203,7 @@ impl Accel {
             let edited = changed.reshaped.contains(&blas.key.mesh);
             let form = if deforms || edited { Form::Dynamic } else { Form::Static { compacted: false } };
             let own = tables.meshes.get(blas.key.mesh)?.element_count();
-            if !deforms && !self.policy.fits_frame(triangles, own) {
+            if !(deforms || blas.succeeds || self.policy.fits_frame(triangles, own)) {
                 self.blases.wait_for_background(number);
                 continue;
             }
@@ -287,9 +287,7 @@ impl Accel {
 
     /// Whether work is left to later frames.
     pub(crate) fn is_busy(&self) -> bool {
-        let may_try = self.frame >= self.try_again_at;
-        let wanted = !self.blases.waiting.is_empty() || !self.blases.decayed.is_empty();
-        self.later.is_busy() || (wanted && may_try)
+        self.later.is_busy() || !self.blases.waiting.is_empty() || !self.blases.decayed.is_empty()
     }
 
     /// Puts the TLAS into the set of a frame that is free to record.

@@ -14,6 +14,7 @@ mod lights;
 mod lobes;
 mod materials;
 mod meshes;
+mod placement;
 mod shapes;
 mod sheen;
 mod snapshot;

@@ -1,6 +1,7 @@
 //! Pictures: comparison with a tolerance, golden images on disk. A picture that fails is written beside the expected
 //! one, with their difference, into `target/test-pictures/`.
 
+use caustica_renderer::Accumulated;
 use std::path::{Path, PathBuf};
 
 use image::{Rgb, RgbImage};
@@ -49,6 +50,11 @@ pub fn difference(a: &RgbImage, b: &RgbImage, steps: u8) -> (f64, u8) {
         largest = largest.max(distance);
     }
     (outliers as f64 / (a.width() * a.height()).max(1) as f64, largest)
+}
+
+/// The largest difference of a channel.
+pub fn largest_difference(a: &Accumulated, b: &Accumulated) -> f32 {
+    a.mean.iter().flatten().zip(b.mean.iter().flatten()).map(|(x, y)| (x - y).abs()).fold(0.0, f32::max)
 }
 
 /// Compares a picture with `tests/golden/NAME.png`; with `CAUSTICA_BLESS` set it becomes the golden one.

@@ -5,7 +5,8 @@
 use std::sync::Arc;
 
 use caustica_renderer::delta::{Camera, Geometry, Instance, InstanceId, Light, Material, SceneDelta};
-use caustica_renderer::{Accumulated, NeedsMode, Pipeline, Show, TlasWork, ToneMap, ViewSettings};
+use caustica_renderer::{NeedsMode, Pipeline, Show, TlasWork, ToneMap, ViewSettings};
+use caustica_tests::picture::largest_difference;
 use caustica_tests::scene::{
     Scene, camera_at, checker, cube, lambert, mirror, plain_use, point_light, quad, sphere,
 };
@@ -42,10 +43,6 @@ fn room(x: f32, radius_m: f32) -> (Scene, InstanceId, Camera) {
 fn studio_of(pipeline: Pipeline, x: f32, radius_m: f32) -> (Studio, InstanceId) {
     let (scene, ball, camera) = room(x, radius_m);
     (Studio::of(EXTENT, settings(pipeline), &scene.delta, camera), ball)
-}
-
-fn largest_difference(a: &Accumulated, b: &Accumulated) -> f32 {
-    a.mean.iter().flatten().zip(b.mean.iter().flatten()).map(|(x, y)| (x - y).abs()).fold(0.0, f32::max)
 }
 
 fn moved(ball: InstanceId, x: f32) -> SceneDelta {

@@ -49,6 +49,33 @@ struct PictureKey {
     extent: [u32; 2],
 }
 
+/// The first pause before a picture that could not be rendered is tried again, and the longest: each is twice the last one.
+const TRY_AGAIN: [Duration; 2] = [Duration::from_millis(250), Duration::from_secs(8)];
+
+/// A picture that could not be rendered. It is tried again when something changes, and after a pause, as memory may be free by then.
+struct Broken {
+    key: PictureKey,
+    pause: Duration,
+    again_at: Instant,
+}
+
+impl Broken {
+    /// `again`: the failure before, of the same picture.
+    fn after(again: Option<Self>, key: PictureKey) -> Self {
+        let pause = again.map_or(TRY_AGAIN[0], |broken| (broken.pause * 2).min(TRY_AGAIN[1]));
+        Self { key, pause, again_at: Instant::now() + pause }
+    }
+
+    /// It is too early to try this picture again.
+    fn holds(&self, key: &PictureKey) -> bool {
+        self.key == *key && !self.delay().is_zero()
+    }
+
+    fn delay(&self) -> Duration {
+        self.again_at.saturating_duration_since(Instant::now())
+    }
+}
+
 /// The window with all it holds. Fields are dropped in this order: the device's users before the window.
 pub(super) struct EditorWindow {
     ui: UiRenderer,
@@ -59,8 +86,8 @@ pub(super) struct EditorWindow {
     adaptive: AdaptiveResolution,
     /// The last picture that was rendered.
     shown: Option<PictureKey>,
-    /// A picture that could not be rendered; it is tried again when something changes.
-    broken: Option<PictureKey>,
+    /// A picture that could not be rendered.
+    broken: Option<Broken>,
     last_picture: Instant,
     /// The next picture follows the last one without a pause or a frame of panels alone.
     continuous: bool,

@@ -161,7 +161,7 @@ fn pending_words(now: &AccelStatistics) -> Option<(String, String)> {
         let lacks = if count == 1 { "It is" } else { "They are" };
         let tip = format!(
             "{lacks} built in the background, so that the window stays alive. \
-             Until then nothing of {} is in the picture: neither seen, nor mirrored, nor casting shadows.",
+             Until then rays do not meet {}: no shadows, no mirror images, and nothing to be seen where the camera casts rays too.",
             if count == 1 { "it" } else { "them" }
         );
         return Some((format!("building {}", meshes(count)), tip));

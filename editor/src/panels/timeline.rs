@@ -151,7 +151,8 @@ fn ruler(ui: &mut Ui, time_s: Option<f64>, duration_s: f64) -> Option<f64> {
         .on_hover_cursor(CursorIcon::ResizeHorizontal)
         .on_hover_text_at_pointer("Drag to another time; Ctrl from frame to frame");
     let held = response.is_pointer_button_down_on() && ui.input(|input| input.pointer.primary_down());
-    let pointer = response.interact_pointer_pos().filter(|_| held)?;
+    // On a slow device the button may be down and up again within one frame.
+    let pointer = response.interact_pointer_pos().filter(|_| held || response.clicked())?;
     let share = f64::from((pointer.x - track.left()) / track.width()).clamp(0.0, 1.0);
     let chosen_s = share * duration_s;
     let snap = ui.input(|input| input.modifiers.command);

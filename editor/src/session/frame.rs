@@ -19,6 +19,9 @@ impl Session {
     /// # Errors
     /// When a shader does not compile or fit, memory runs out, or the device is lost.
     pub fn begin_frame(&mut self, extent_px: [u32; 2]) -> anyhow::Result<Recorder> {
+        if std::mem::take(&mut self.resync) {
+            self.send_all_again()?;
+        }
         let mut lap = Lap::start();
         let mut recorder = self.frames.begin()?;
         self.renderer.note_times(self.view, &self.frames)?;
@@ -33,12 +36,19 @@ impl Session {
         }
     }
 
+    /// After a change that the device had no room for, part of which is there: takes the scene off it and waits until its memory is free;
+    /// the next delta sends the whole document.
+    fn send_all_again(&mut self) -> anyhow::Result<()> {
+        // Marked first: should this fail too, the next frame still sends everything.
+        self.document.mark_all_added("tried again");
+        let mut recorder = self.frames.begin()?;
+        let emptied = self.renderer.apply(&mut recorder, &std::mem::take(&mut self.sync).clear());
+        self.frames.submit(recorder, None)?;
+        emptied?;
+        Ok(self.frames.finish()?)
+    }
+
     fn record(&mut self, recorder: &mut Recorder, extent_px: [u32; 2]) -> anyhow::Result<()> {
-        if std::mem::take(&mut self.resync) {
-            // Marked first: should this fail too, the next frame still sends everything.
-            self.document.mark_all_added("tried again");
-            self.renderer.apply(recorder, &std::mem::take(&mut self.sync).clear())?;
-        }
         let mut lap = Lap::start();
         let delta = self.sync.delta(&mut self.document, self.camera.world_from_camera.translation);
         self.host_times.sync_ms = lap.ms();

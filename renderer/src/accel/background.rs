@@ -12,7 +12,7 @@ use caustica_gpu::{
 use super::blas::{BlasTable, Built, Form};
 use super::build::{Job, SCRATCH_BUDGET, batch, job_of, scratch_of};
 use super::policy::{AccelPolicy, REST_FRAMES};
-use crate::error::Result;
+use crate::error::{RendererError, Result};
 use crate::tables::{Snapshot, Tables};
 
 /// Triangles of one batch of builds, unless a single mesh has more.
@@ -174,15 +174,36 @@ impl Later {
         let resting: Vec<u32> = blases.lively.iter().copied().filter(rests).collect();
         let fast = Form::Static { compacted: false };
         let builds = [(first, fast), (loose, Form::Dynamic), (resting, fast)];
-        let batch = match builds.into_iter().find(|(numbers, _)| !numbers.is_empty()) {
-            Some((numbers, form)) => self.builds(recorder, tables, blases, &numbers, form)?,
-            None if policy.compact && !blases.uncompacted.is_empty() => self.compactions(blases)?,
-            None => None,
-        };
-        self.prepared = batch.map(|batch| (self.device.recording(), batch));
-        Ok(())
+        let mut lacking = None;
+        for (numbers, form) in builds {
+            let batch = self.builds(recorder, tables, blases, &numbers, form);
+            if self.take(batch, &mut lacking)? {
+                return Ok(());
+            }
+        }
+        if policy.compact && !blases.uncompacted.is_empty() {
+            let batch = self.compactions(blases);
+            self.take(batch, &mut lacking)?;
+        }
+        if self.prepared.is_some() { Ok(()) } else { lacking.map_or(Ok(()), Err) }
     }
 
+    /// True: this is the next batch. Where memory lacks for it, the next kind of work may still do, compaction above all.
+    fn take(&mut self, batch: Result<Option<Batch>>, lacking: &mut Option<RendererError>) -> Result<bool> {
+        match batch {
+            Ok(batch) => {
+                self.prepared = batch.map(|batch| (self.device.recording(), batch));
+                Ok(self.prepared.is_some())
+            }
+            Err(error) if error.is_out_of_memory() => {
+                *lacking = Some(error);
+                Ok(false)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// As many of them as a batch takes; those that memory lacks for are passed over while others fit.
     fn builds(
         &self,
         recorder: &mut Recorder,
@@ -192,17 +213,20 @@ impl Later {
         form: Form,
     ) -> Result<Option<Batch>> {
         let (mut jobs, mut items, mut triangles) = (Vec::new(), Vec::new(), 0);
+        let mut lacking = None;
         for number in numbers {
             let Some(blas) = blases.get(*number) else { continue };
-            let snapshot = tables.snapshot(recorder, blas.key.mesh, blas.key.deforming)?;
-            let job = job_of(
-                &self.device,
-                tables,
-                (*number, &blas.key),
-                (form, BuildMode::Build),
-                None,
-                Some(&snapshot),
-            )?;
+            let made = tables.snapshot(recorder, blas.key.mesh, blas.key.deforming).and_then(|snapshot| {
+                let (what, how) = ((*number, &blas.key), (form, BuildMode::Build));
+                Ok((job_of(&self.device, tables, what, how, None, Some(&snapshot))?, snapshot))
+            });
+            let (job, snapshot) = match made {
+                Err(error) if error.is_out_of_memory() => {
+                    lacking = Some(error);
+                    continue;
+                }
+                made => made?,
+            };
             triangles += job.element_count();
             items.push(Item {
                 number: *number,
@@ -218,7 +242,10 @@ impl Later {
                 break;
             }
         }
-        Ok((!jobs.is_empty()).then_some(Batch::Builds(jobs, items)))
+        match lacking {
+            Some(error) if jobs.is_empty() => Err(error),
+            _ => Ok((!jobs.is_empty()).then_some(Batch::Builds(jobs, items))),
+        }
     }
 
     /// Asks for sizes as long as some are unknown, then copies.

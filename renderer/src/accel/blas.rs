@@ -112,6 +112,9 @@ pub(crate) struct Blas {
     pub(crate) key: BlasKey,
     pub(crate) users: u32,
     pub(crate) built: Option<Built>,
+    /// It took the place of one that was built, as when a material lets light through: whatever its size it is built at once, for what was seen
+    /// must not vanish.
+    pub(crate) succeeds: bool,
     /// Frame of the last change of its geometry.
     pub(crate) changed_at: u64,
     /// Another one with every change of its geometry: what was begun before is told from what fits.
@@ -180,12 +183,15 @@ impl BlasTable {
         if old.and_then(|number| self.get(number)).map(|blas| &blas.key) == key.as_ref() {
             return false;
         }
+        let shown = old.and_then(|old| self.get(old)).filter(|old| old.built.is_some());
+        let succeeds = shown.zip(key.as_ref()).is_some_and(|(old, new)| old.key.mesh == new.mesh);
         let number = key.map(|key| match self.by_key.get(&key) {
             Some(number) => *number,
             None => self.insert(key),
         });
         if let Some(blas) = number.and_then(|number| self.get_mut(number)) {
             blas.users += 1;
+            blas.succeeds |= succeeds;
         }
         self.of_slot[slot as usize] = number;
         if let Some(blas) = old.and_then(|old| self.get_mut(old)) {
@@ -208,6 +214,7 @@ impl BlasTable {
             key,
             users: 0,
             built: None,
+            succeeds: false,
             changed_at: 0,
             version: self.next_version,
             content: self.next_version,

@@ -79,10 +79,11 @@ impl Tables {
             changed.meshes.insert(*id);
         }
         for (id, geometry, map) in &delta.primitive_transforms {
-            if self.meshes.set_primitive(*id, *geometry, map)? {
+            let moved = self.meshes.set_primitive(*id, *geometry, map)?;
+            if moved.turned_over {
                 others.meshes.insert(*id);
             }
-            self.deforming.set_primitive(*id, *geometry, map);
+            self.deforming.set_primitive(*id, *geometry, &moved.map);
             changed.reshaped.insert(*id);
             if self.emissive.places(*id, &self.instances) {
                 self.emissive.mark_stale();

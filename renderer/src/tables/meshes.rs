@@ -7,6 +7,7 @@ use caustica_gpu::{Buffer, BufferUse, Device, Location, MemoryUse, Recorder, Res
 use glam::{Affine3A, Vec3};
 
 use super::deformation::DeformationBuffers;
+use super::placement::{bounds_of, centre_of, placed, standing};
 use super::shapes::{self, ShapeBuffers};
 use super::spatial_order::sort_triangles;
 use crate::delta::{self, Mesh, MeshId};
@@ -122,6 +123,14 @@ impl GpuMesh {
     }
 }
 
+/// What became of a primitive that was to be moved.
+pub(crate) struct MovedPrimitive {
+    /// Where it stands.
+    pub(crate) map: Affine3A,
+    /// It was turned over, or turned back.
+    pub(crate) turned_over: bool,
+}
+
 /// All meshes, by id.
 pub(crate) struct Meshes {
     device: Arc<Device>,
@@ -160,7 +169,12 @@ impl Meshes {
     pub(crate) fn set(&mut self, recorder: &mut Recorder, id: MeshId, mesh: &Arc<Mesh>) -> Result<bool> {
         check(mesh, &self.device)?;
         let deformation = DeformationBuffers::new(&self.device, recorder, mesh)?.map(Arc::new);
-        let mesh = Arc::new(in_spatial_order(mesh));
+        let mut mesh = in_spatial_order(mesh);
+        let bounds: Vec<_> = mesh.geometries.iter().map(|geometry| bounds_of(&mesh, geometry)).collect();
+        for (geometry, bounds) in mesh.geometries.iter_mut().zip(&bounds) {
+            geometry.mesh_from_primitive = standing(&geometry.mesh_from_primitive, *bounds);
+        }
+        let mesh = Arc::new(mesh);
         let make = |what: &str, size: usize| {
             let name = format!("{} {what}", mesh.name);
             let (usage, kind) = (BufferUse::Geometry, MemoryUse::Geometry);
@@ -181,7 +195,6 @@ impl Meshes {
         let geometries = make("geometries", size_of_val(records.as_slice()))?;
         self.dirty.extend((0..records.len() as u32).map(|geometry| (id, geometry)));
         self.unboxed.extend((0..records.len() as u32).map(|geometry| (id, geometry)));
-        let bounds: Vec<_> = mesh.geometries.iter().map(|geometry| bounds_of(&mesh, geometry)).collect();
         let centre = centre_of(&mesh, &bounds);
         let new = GpuMesh { vertices, shapes, records, geometries, deformation, host: mesh, bounds, centre };
         self.triangle_count += new.triangle_count();
@@ -190,36 +203,33 @@ impl Meshes {
         Ok(old.is_some())
     }
 
-    /// Moves a primitive inside its mesh. True: it was turned over, or turned back.
+    /// Moves a primitive inside its mesh. Returns where it stands now: nowhere, when single precision ends before.
     ///
     /// # Errors
-    /// When there is no such mesh or primitive, or the map is not finite.
+    /// When there is no such mesh or primitive.
     pub(crate) fn set_primitive(
         &mut self,
         id: MeshId,
         geometry: u32,
         mesh_from_primitive: &Affine3A,
-    ) -> Result<bool> {
+    ) -> Result<MovedPrimitive> {
         let unknown =
             || RendererError::Unknown { what: "primitive of a mesh", id: format!("{}/{geometry}", id.0) };
         let mesh = self.by_id.get_mut(&id).ok_or_else(unknown)?;
         let record = mesh.records.get_mut(geometry as usize).ok_or_else(unknown)?;
-        if !mesh_from_primitive.is_finite() {
-            let what = "finite transform for a primitive of mesh";
-            return Err(RendererError::Unknown { what, id: mesh.host.name.clone() });
-        }
+        let map = standing(mesh_from_primitive, mesh.bounds[geometry as usize]);
         if !self.moved_last_frame.contains(&(id, geometry)) {
             record.previous_mesh_from_primitive = record.mesh_from_primitive;
         }
-        record.mesh_from_primitive = rows_of(mesh_from_primitive);
+        record.mesh_from_primitive = rows_of(&map);
         record.flags = (record.flags & GEOMETRY_SHAPES) | GEOMETRY_MOVED | GEOMETRY_MOVING;
         self.moved_last_frame.insert((id, geometry));
         let host = &mut Arc::make_mut(&mut mesh.host).geometries[geometry as usize];
-        let old = std::mem::replace(&mut host.mesh_from_primitive, *mesh_from_primitive);
+        let old = std::mem::replace(&mut host.mesh_from_primitive, map);
         mesh.centre = centre_of(&mesh.host, &mesh.bounds);
         self.dirty.insert((id, geometry));
         self.unboxed.insert((id, geometry));
-        Ok(turned(&old) != turned(mesh_from_primitive))
+        Ok(MovedPrimitive { map, turned_over: turned(&old) != turned(&map) })
     }
 
     /// A frame has gone by: primitives that moved in it stand still until they move again.
@@ -338,37 +348,6 @@ pub(crate) fn rows_of(map: &Affine3A) -> Rows {
         [m.x_axis.y, m.y_axis.y, m.z_axis.y, t.y],
         [m.x_axis.z, m.y_axis.z, m.z_axis.z, t.z],
     ]
-}
-
-/// Bounds of a primitive, primitive space; a point at the origin when it is empty.
-fn bounds_of(mesh: &Mesh, geometry: &delta::Geometry) -> (Vec3, Vec3) {
-    let range = geometry.first_index as usize..(geometry.first_index + geometry.index_count) as usize;
-    if !mesh.shapes.is_empty() {
-        let boxes = mesh.shapes[range].iter().map(shapes::bounds_of);
-        return boxes.reduce(join).unwrap_or((Vec3::ZERO, Vec3::ZERO));
-    }
-    let points = mesh.indices[range].iter().map(|i| mesh.positions[*i as usize]);
-    points.map(|p| (p, p)).reduce(join).unwrap_or((Vec3::ZERO, Vec3::ZERO))
-}
-
-fn join(a: (Vec3, Vec3), b: (Vec3, Vec3)) -> (Vec3, Vec3) {
-    (a.0.min(b.0), a.1.max(b.1))
-}
-
-/// Bounds of a box after a map.
-fn placed((low, high): (Vec3, Vec3), map: &Affine3A) -> (Vec3, Vec3) {
-    let (centre, half) = ((low + high) * 0.5, (high - low) * 0.5);
-    let m = map.matrix3;
-    let reach = Vec3::from(m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z);
-    let centre = map.transform_point3(centre);
-    (centre - reach, centre + reach)
-}
-
-/// Middle of the bounds of all primitives, mesh space.
-fn centre_of(mesh: &Mesh, bounds: &[(Vec3, Vec3)]) -> Vec3 {
-    let all =
-        mesh.geometries.iter().zip(bounds).map(|(geometry, b)| placed(*b, &geometry.mesh_from_primitive));
-    all.reduce(join).map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5)
 }
 
 /// The mesh with the triangles or shapes of each geometry in spatial order.

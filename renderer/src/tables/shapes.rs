@@ -128,10 +128,6 @@ fn fault(mesh: &Mesh) -> Option<String> {
     if let Some(bad) = mesh.shapes.iter().position(|shape| !shape.centre.is_finite()) {
         return Some(format!("the centre of shape {bad} is no number"));
     }
-    let places = mesh.geometries.iter().map(|geometry| &geometry.mesh_from_primitive);
-    if let Some(bad) = places.into_iter().position(|map| !map.is_finite()) {
-        return Some(format!("the transform of primitive {bad} is not finite"));
-    }
     let count = mesh.shapes.len() as u64;
     let end = |range: &delta::Geometry| u64::from(range.first_index) + u64::from(range.index_count);
     let past = mesh.geometries.iter().map(end).find(|end| *end > count);
@@ -180,7 +176,6 @@ mod tests {
         refused(|m| m.shapes[0].kind = ShapeKind::Box, "size of shape 0");
         refused(|m| m.shapes[1].centre.y = f32::NAN, "centre of shape 1");
         refused(|m| m.geometries[0].index_count = 4, "ends at shape 4 of 3");
-        refused(|m| m.geometries[0].mesh_from_primitive.translation.x = f32::NAN, "transform of primitive 0");
         let none = Mesh { shapes: Vec::new(), positions: vec![Vec3::NAN], ..mesh() };
         assert!(check(&none).is_ok(), "triangles are checked elsewhere");
     }

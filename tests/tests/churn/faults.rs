@@ -102,3 +102,41 @@ fn a_spoilt_instance_of_two_hundred_is_lost_alone() {
     let refused = session.push(Edit::SetTransform { target: Target::node(crowd[7]), local: nan });
     assert_eq!(refused, Err(EditError::NotFinite));
 }
+
+/// Maps of a primitive that leave single precision: the last two with entries that are all in it.
+fn beyond() -> [(&'static str, DAffine3); 4] {
+    let far = DVec3::splat(3e38);
+    [
+        ("far beyond", DAffine3::from_translation(DVec3::Y * 1e300)),
+        ("large beyond", DAffine3::from_scale(DVec3::splat(1e39))),
+        ("far", DAffine3::from_translation(far)),
+        ("sheared", DAffine3::from_mat3(DMat3::from_cols(far, -far, DVec3::Z))),
+    ]
+}
+
+#[test]
+fn a_spoilt_primitive_is_lost_alone() {
+    let gpu = gpu::session();
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = new_session(&gpu, NeedsMode::Auto);
+    furnish(&mut session, &model::write(folder.path()));
+    crowd(&mut session);
+    let mesh = session.document().meshes().find(|(_, mesh)| mesh.name == "Pair").expect("the pair").0;
+    for pipeline in [Pipeline::Hybrid, Pipeline::Raytraced, Pipeline::Raster] {
+        let whole = picture(&mut session, pipeline);
+        let mut put = |map: DAffine3| {
+            let edit = Edit::SetPrimitiveTransform { mesh, primitive: 1, mesh_from_primitive: map };
+            session.push(edit).expect("a place");
+            let found = picture(&mut session, pipeline);
+            session.undo();
+            found
+        };
+        let without = put(DAffine3::from_scale(DVec3::ZERO));
+        assert!(differing(&whole, &without) > 100, "the primitive is seen");
+        for (name, map) in beyond() {
+            assert_eq!(differing(&put(map), &without), 0, "{name}, {}", pipeline.name());
+        }
+        // Boxes touch each other, and another tree may find the other one first.
+        assert!(differing(&picture(&mut session, pipeline), &whole) < 40, "and back, {}", pipeline.name());
+    }
+}

@@ -8,7 +8,7 @@ use caustica_renderer::gpu::{Access, GpuError, Recorder, Stage, Use};
 use egui::ViewportId;
 use egui::epaint::ClippedPrimitive;
 
-use super::{DEVICE_POLL, EditorWindow, PictureKey};
+use super::{Broken, DEVICE_POLL, EditorWindow, PictureKey};
 use crate::theme;
 
 /// A device that takes longer than this from one submit to the next repaints the panels alone while there is input.
@@ -85,7 +85,7 @@ impl EditorWindow {
         let waits =
             fresh && self.had_input && self.is_slow() && self.last_picture.elapsed() < PICTURE_AT_LEAST_EVERY;
         let done = fresh && self.editor.session.is_done();
-        if waits || done || self.broken.as_ref() == Some(&key) {
+        if waits || done || self.broken.as_ref().is_some_and(|broken| broken.holds(&key)) {
             return self.panels_alone();
         }
         let config = &self.editor.state.config;
@@ -102,8 +102,12 @@ impl EditorWindow {
             }
             Err(error) if is_fatal(&error) => Err(error),
             Err(error) => {
-                self.editor.state.toasts.error(format!("The picture cannot be rendered: {error:#}."));
-                self.broken = Some(key);
+                // What was retired may have made room: tried again by itself, and reported once.
+                let again = self.broken.take().filter(|broken| broken.key == key);
+                if again.is_none() {
+                    self.editor.state.toasts.error(format!("The picture cannot be rendered: {error:#}."));
+                }
+                self.broken = Some(Broken::after(again, key));
                 self.panels_alone()
             }
         }
@@ -210,11 +214,13 @@ impl EditorWindow {
     }
 
     fn plan_next(&mut self, repaint_delay: Duration) {
+        let repaint_delay =
+            self.broken.as_ref().map_or(repaint_delay, |broken| broken.delay().min(repaint_delay));
         let full = self.editor.state.view.extent_px;
         let fresh = full.is_some_and(|full| self.shown.as_ref() == Some(&self.key(full)));
         let whole = self.editor.state.view.divisor == 1;
         let unfinished = full.is_some_and(|full| {
-            self.broken.as_ref() != Some(&self.key(full))
+            !self.broken.as_ref().is_some_and(|broken| broken.holds(&self.key(full)))
                 && !(fresh && whole && self.editor.session.is_done())
         });
         // While an animation plays the next picture is due, and with it the panels: time goes on there.

@@ -45,7 +45,7 @@ impl Session {
         let emptied = self.renderer.apply(&mut recorder, &std::mem::take(&mut self.sync).clear());
         self.frames.submit(recorder, None)?;
         emptied?;
-        Ok(self.frames.finish()?)
+        Ok(self.frames.trim()?)
     }
 
     fn record(&mut self, recorder: &mut Recorder, extent_px: [u32; 2]) -> anyhow::Result<()> {

@@ -171,6 +171,16 @@ impl Frames {
         Ok(())
     }
 
+    /// Waits like [`Frames::finish`] and gives back the staging memory that is kept for the next uploads.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn trim(&mut self) -> Result<()> {
+        self.finish()?;
+        self.slots.iter_mut().for_each(|slot| slot.staging = None);
+        Ok(())
+    }
+
     /// Pass times of the newest frame known to have finished.
     pub fn finished(&self) -> &FrameResult {
         &self.finished

@@ -56,16 +56,12 @@ impl Staging {
             start
         } else {
             let last = self.chunks.last().map_or(FIRST_CHUNK, |chunk| (chunk.size() * 2).min(KEPT_CHUNK));
-            let size = last.max(len);
-            let chunk = Buffer::new(
-                &self.device,
-                "staging",
-                size,
-                BufferUse::General,
-                Location::Upload,
-                MemoryUse::Staging,
-            )?;
-            self.chunks.push(chunk);
+            let chunk = |size| {
+                let (usage, kind) = (BufferUse::General, MemoryUse::Staging);
+                Buffer::new(&self.device, "staging", size, usage, Location::Upload, kind)
+            };
+            // Where memory is short, no more than is needed.
+            self.chunks.push(chunk(last.max(len)).or_else(|_| chunk(len))?);
             0
         };
         self.used = start + len;

@@ -7,10 +7,10 @@ use crate::accel::Accel;
 use crate::delta::Invalidation;
 use crate::error::Result;
 use crate::gpu_types::{
-    self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND,
+    self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND, FRAME_STEADY,
 };
 use crate::needs::Needs;
-use crate::passes::{PassSet, Radiance, Scope, Shown};
+use crate::passes::{Moving, PassSet, Radiance, Scope, Shown};
 use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
 use crate::tables::Tables;
 use crate::view::{CameraMatrices, Targets, View};
@@ -35,8 +35,8 @@ pub(crate) fn record(
     if what == Invalidation::Everything {
         view.history = None;
     }
-    let plan = Plan::of(view, what, needs);
-    let band = view.bands.next(view.extent()[1], plan.moved);
+    let plan = Plan::of(view, what, passes.radiance.denoises());
+    let band = view.bands.next(view.extent()[1], plan.moved || plan.moving);
     recorder.set_tag(view.bands.tag(&band));
     let matrices = CameraMatrices::of(view.camera(), view.extent());
     let constants = frame_constants(recorder, view, tables, &matrices, &plan)?;
@@ -62,12 +62,10 @@ pub(crate) fn record(
         passes.gbuffer.record(recorder, &scope, targets, parity)?;
     }
     let filled = view.history.map_or(0, |filled| 1 - filled);
+    let moving = plan.moving.then_some(Moving { filled, counters: &view.counters.device });
     match &passes.radiance {
-        Radiance::Path(path) => path.record(recorder, &scope, targets)?,
-        Radiance::Deferred(deferred) => {
-            let past = plan.moving.then_some((filled, &view.counters.device));
-            deferred.record(recorder, &scope, targets, parity, past)?;
-        }
+        Radiance::Path(path) => path.record(recorder, &scope, targets, parity, moving)?,
+        Radiance::Deferred(deferred) => deferred.record(recorder, &scope, targets, parity, moving)?,
     }
     if band.last && !plan.moving {
         passes.accumulate.record(recorder, &scope, targets, accumulator, &view.counters.device)?;
@@ -100,7 +98,7 @@ pub(crate) fn record(
     if !band.last {
         return Ok(());
     }
-    if plan.moving && passes.radiance.denoises() {
+    if plan.moving {
         view.history = Some(filled);
     }
     if !plan.moving {
@@ -135,16 +133,16 @@ fn record_light_shadow(
 struct Plan {
     /// The camera or the scene moved: the frame must be whole, or a drag would never show one.
     moved: bool,
-    /// Shown denoised, not accumulated: something moved.
+    /// Shown denoised, not accumulated: something moved, or stills are denoised too.
     moving: bool,
     /// The past belongs to the last frame and may be reprojected.
     history: bool,
 }
 
 impl Plan {
-    fn of(view: &View, what: Invalidation, needs: Needs) -> Self {
+    fn of(view: &View, what: Invalidation, denoises: bool) -> Self {
         let moved = matches!(what, Invalidation::Camera | Invalidation::Scene);
-        let moving = moved && needs.temporal && view.settings().temporal;
+        let moving = (moved || view.settings().denoise_stills) && denoises;
         Self { moved, moving, history: moving && view.history.is_some() && view.previous.is_some() }
     }
 }
@@ -173,6 +171,7 @@ fn frame_constants(
         (plan.history, FRAME_HISTORY),
         (settings.opaque_glass_shadows, FRAME_OPAQUE_GLASS),
         (path, FRAME_PATHS_BEND),
+        (!plan.moved, FRAME_STEADY),
     ] {
         flags |= if set { flag } else { 0 };
     }

@@ -181,8 +181,10 @@ pub struct Needs {
     pub alpha: bool,
     /// Shadow rays: false in the raster pipeline.
     pub shadow_rays: bool,
-    /// The temporal pass.
+    /// Light is denoised over time while something moves.
     pub temporal: bool,
+    /// And over space.
+    pub spatial: bool,
     /// Motion vectors.
     pub motion: bool,
     /// Spheres and boxes.
@@ -211,7 +213,9 @@ impl Needs {
             || scene.lights > settings.light_samples
             || scene.emissive_triangles > 0
             || scene.environment
-            || surfaces.alpha;
+            || surfaces.alpha
+            || (paths && scene.lights > 0);
+        let temporal = settings.temporal && rays;
         Self {
             lights: all || scene.lights > 0,
             emissive_lights: all || scene.emissive_triangles > 0,
@@ -226,8 +230,9 @@ impl Needs {
             any_hit: rays && (all || surfaces.any_hit),
             alpha: all || surfaces.alpha,
             shadow_rays: rays,
-            temporal: settings.temporal && rays && !paths && (all || noisy),
-            motion: all || settings.show == Show::Motion || (settings.temporal && rays && !paths && noisy),
+            temporal: temporal && (all || noisy),
+            spatial: temporal && settings.spatial && (all || noisy),
+            motion: all || settings.show == Show::Motion || (temporal && noisy),
             shapes: all || scene.shapes,
             primary_rays: paths || settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
             paths,
@@ -283,7 +288,16 @@ impl Needs {
                 nothing
             }
         };
-        let list: [(bool, &str, &str); 16] = [
+        let why_not_denoised = |switched_off: &'static str| {
+            if !rays {
+                no_rays
+            } else if settings.temporal && !self.temporal {
+                "every light is hard, so one ray gives the exact shadow"
+            } else {
+                switched_off
+            }
+        };
+        let list: [(bool, &str, &str); 17] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -311,18 +325,15 @@ impl Needs {
                 "raster of primary surfaces",
                 "the scene holds spheres or boxes, which rays meet without drawing each",
             ),
+            (self.temporal, "temporal denoising", why_not_denoised("a still image accumulates its samples")),
             (
-                self.temporal,
-                "temporal denoising",
-                if !rays {
-                    no_rays
-                } else if self.paths {
-                    "paths are averaged, not filtered"
-                } else if settings.temporal {
-                    "every light is hard, so one ray gives the exact shadow"
+                self.spatial,
+                "spatial denoising",
+                why_not_denoised(if settings.temporal {
+                    "it is switched off"
                 } else {
                     "a still image accumulates its samples"
-                },
+                }),
             ),
         ];
         list.into_iter()

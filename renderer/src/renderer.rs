@@ -313,6 +313,17 @@ impl Renderer {
         Ok(halves.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|i| half_to_float(p[i]))).collect())
     }
 
+    /// Reads the radiance of the last frame of a view, denoised where that frame was. Waits for the device.
+    ///
+    /// # Errors
+    /// When the view was removed or has no frame yet, or the device fails.
+    pub fn read_frame(&mut self, frames: &mut Frames, id: ViewId) -> Result<Vec<[f32; 3]>> {
+        let nothing = || RendererError::Unknown { what: "frame of view", id: id.0.to_string() };
+        let (_, targets) = self.view(id)?.targets.as_ref().ok_or_else(nothing)?;
+        let floats: Vec<f32> = words_of(&read_image(&self.device, frames, &targets.shaded)?);
+        Ok(floats.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect())
+    }
+
     /// What is seen through a pixel in the last frame. Waits for the device.
     ///
     /// # Errors

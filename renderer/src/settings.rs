@@ -149,6 +149,10 @@ pub struct ViewSettings {
     pub opaque_glass_shadows: bool,
     /// Denoise over time while things move. Off for headless stills, which accumulate anyway.
     pub temporal: bool,
+    /// Denoise over space too; nothing without `temporal`.
+    pub spatial: bool,
+    /// Denoise when nothing moves, too: frames are filtered and nothing is accumulated.
+    pub denoise_stills: bool,
     /// Longest history while moving, frames.
     pub temporal_max_history: f32,
     /// Jitter primary samples inside the pixel; off gives hard, reproducible edges for tests.
@@ -174,6 +178,8 @@ impl Default for ViewSettings {
             reflection_roughness_max: 0.5,
             opaque_glass_shadows: false,
             temporal: true,
+            spatial: true,
+            denoise_stills: false,
             temporal_max_history: 24.0,
             jitter: true,
         }

@@ -11,6 +11,7 @@ const uint FRAME_MOVING = 2u;           // show the denoised signals of this fra
 const uint FRAME_HISTORY = 4u;          // the temporal history belongs to the last frame and may be reprojected
 const uint FRAME_OPAQUE_GLASS = 8u;     // shadow rays stop at refractive surfaces (setting)
 const uint FRAME_PATHS_BEND = 16u;      // shadow rays stop where paths bend or spread, which find the light by themselves (path tracer)
+const uint FRAME_STEADY = 32u;          // nothing has moved since the last frame: the history is exact, and not clamped
 
 // Frame.tone_map, in the order of renderer::ToneMap.
 const uint TONE_MAP_LINEAR = 0u;

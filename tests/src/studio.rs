@@ -152,6 +152,14 @@ impl Studio {
         self.renderer.read_back(&mut self.session.frames, self.view).expect("a read-back")
     }
 
+    /// Reads the radiance of the last frame, denoised where that frame was.
+    ///
+    /// # Panics
+    /// When the device fails.
+    pub fn read_frame(&mut self) -> Vec<[f32; 3]> {
+        self.renderer.read_frame(&mut self.session.frames, self.view).expect("a read-back")
+    }
+
     /// Reads the tone-mapped, linear image.
     ///
     /// # Panics

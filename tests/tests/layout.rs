@@ -232,6 +232,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         alpha: false,
         shadow_rays: false,
         temporal: false,
+        spatial: false,
         motion: false,
         shapes: false,
         primary_rays: false,

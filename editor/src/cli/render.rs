@@ -86,6 +86,9 @@ pub(super) struct RenderArgs {
     /// What a PNG shows: the image, or a step on the way such as base_color, normal, depth
     #[arg(long, value_name = "VIEW", value_parser = parse_show, long_help = show_help())]
     show: Option<Show>,
+    /// Filter the picture: over the frames alone, or over space too. Less noise for a bias that is not known
+    #[arg(long, value_enum, conflicts_with_all = ["target_error", "sample_offset"], default_missing_value = "full", num_args = 0..=1)]
+    denoise: Option<DenoiseArg>,
     /// The light of `--show shadow`: its name, or its number from 1; without it the first that shines
     #[arg(long, value_name = "NAME|N")]
     show_light: Option<String>,
@@ -100,6 +103,20 @@ enum PipelineArg {
     Hybrid,
     Raytraced,
     Path,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum DenoiseArg {
+    Off,
+    Temporal,
+    Full,
+}
+
+impl RenderArgs {
+    /// The picture is denoised, and so is no mean of samples.
+    fn denoises(&self) -> bool {
+        self.denoise.is_some_and(|denoise| denoise != DenoiseArg::Off)
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -243,7 +260,7 @@ pub(super) fn run(
     let run = accumulate(&mut session, args, &progress)?;
     progress.finish_and_clear();
     let metadata = Metadata {
-        samples: session.samples(),
+        samples: run.samples,
         sample_offset: args.sample_offset,
         seconds: run.seconds,
         device: format!("{}, {}", device.name(), device.driver()),
@@ -251,18 +268,25 @@ pub(super) fn run(
         sampler: session.settings().sampler.name(),
         seed: session.settings().seed,
     };
-    let accumulated = session.read_back()?;
-    let noise = noise_of(&accumulated, metadata.samples);
+    // What a scene leaves out cannot be denoised: it was accumulated as ever.
+    let denoised = session.samples() == 0;
+    let (radiance, noise) = if denoised {
+        (session.read_frame()?, None)
+    } else {
+        let accumulated = session.read_back()?;
+        let noise = noise_of(&accumulated, metadata.samples);
+        (accumulated.mean, noise)
+    };
     match kind {
-        Kind::Exr => output::write_exr(&args.output, args.size, &accumulated.mean, &metadata)?,
+        Kind::Exr => output::write_exr(&args.output, args.size, &radiance, &metadata)?,
         Kind::Png => output::write_png(&args.output, args.size, &session.read_display()?)?,
     }
     report_validation(&device)?;
     if args.json {
-        say!("{}", summary(args, &session, &metadata, &run, noise, loaded_in));
+        say!("{}", summary(args, &session, &metadata, &run, noise, denoised, loaded_in));
     } else {
         say!(
-            "{}: {}x{}, {} samples in {:.2} s ({}), noise {}, {}",
+            "{}: {}x{}, {} samples in {:.2} s ({}), noise {}{}, {}",
             args.output.display(),
             args.size[0],
             args.size[1],
@@ -270,6 +294,7 @@ pub(super) fn run(
             metadata.seconds,
             metadata.pipeline,
             noise.map_or_else(|| String::from("unknown"), |noise| format!("{:.2} %", noise * 100.0)),
+            if denoised { ", denoised: bias unknown" } else { "" },
             metadata.device
         );
     }
@@ -319,7 +344,11 @@ fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
         path_depth: args.max_depth.or(of_project.path_depth),
         multiple_scattering: args.multiple_scattering || of_project.multiple_scattering,
         shadow_rays: args.shadow_rays.unwrap_or(of_project.shadow_rays),
-        temporal: false,
+        temporal: args.denoises(),
+        spatial: args.denoise == Some(DenoiseArg::Full),
+        denoise_stills: args.denoises(),
+        // A still keeps all of its frames.
+        temporal_max_history: if args.denoises() { f32::MAX } else { of_project.temporal_max_history },
         ..of_project
     }
 }
@@ -327,6 +356,7 @@ fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
 /// How a run went.
 struct Run {
     seconds: f64,
+    samples: u64,
     /// Milliseconds of each frame, by pass.
     frames: Vec<Vec<(String, f64)>>,
 }
@@ -346,15 +376,17 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     let start = Instant::now();
     let mut frames = Vec::new();
     let in_time = |samples: u64| samples == 0 || limit.is_none_or(|limit| start.elapsed() < limit);
-    while session.samples() < samples && in_time(session.samples()) {
+    let mut done = 0;
+    while done < samples && in_time(done) {
         let recorder = session.begin_frame(args.size)?;
         session.submit(recorder, None)?;
         let times = &session.statistics().passes;
         if frames.len() < TIMED_FRAMES && !times.is_empty() {
             frames.push(times.clone());
         }
-        progress.set_position(session.samples());
-        let done = session.samples();
+        // Frames that are denoised are not accumulated.
+        done = if args.denoises() { done + 1 } else { session.samples() };
+        progress.set_position(done);
         // Looked at a few times only: reading back waits for the device.
         if let Some(target) = args.target_error
             && done >= 16
@@ -366,7 +398,7 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     }
     session.finish()?;
     frames.push(session.statistics().passes.clone());
-    Ok(Run { seconds: start.elapsed().as_secs_f64(), frames })
+    Ok(Run { samples: done, seconds: start.elapsed().as_secs_f64(), frames })
 }
 
 /// sqrt(relMSE) of the mean by the two streams: their half difference has the variance of the mean. `None` with one
@@ -391,6 +423,7 @@ fn summary(
     metadata: &Metadata,
     run: &Run,
     noise: Option<f64>,
+    denoised: bool,
     loaded_in: Duration,
 ) -> serde_json::Value {
     let statistics = session.statistics();
@@ -414,6 +447,7 @@ fn summary(
         "load_seconds": loaded_in.as_secs_f64(),
         "ms_per_pass": passes,
         "noise": noise,
+        "denoised": denoised,
         "acceleration_structures": statistics.acceleration,
         "memory_bytes": memory,
         "non_finite_samples": statistics.non_finite,

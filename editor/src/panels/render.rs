@@ -219,6 +219,7 @@ fn path_depth(ui: &mut Ui, settings: &mut ViewSettings) {
 fn moving(cx: &mut Cx<'_>, ui: &mut Ui, settings: &mut ViewSettings) {
     field(ui, "Denoise", "Use earlier frames while something moves", |ui| {
         ui.checkbox(&mut settings.temporal, "over time");
+        ui.add_enabled(settings.temporal, egui::Checkbox::new(&mut settings.spatial, "over space"));
     });
     let config = &mut cx.state.config;
     field(

@@ -7,7 +7,8 @@ use crate::accel::Accel;
 use crate::delta::Invalidation;
 use crate::error::Result;
 use crate::gpu_types::{
-    self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND, FRAME_STEADY,
+    self, FRAME_DENOISED, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC,
+    FRAME_PATHS_BEND, FRAME_STEADY,
 };
 use crate::needs::Needs;
 use crate::passes::{Moving, PassSet, Radiance, Scope, Shown};
@@ -36,7 +37,7 @@ pub(crate) fn record(
         view.history = None;
     }
     let plan = Plan::of(view, what, passes.radiance.denoises());
-    let band = view.bands.next(view.extent()[1], plan.moved || plan.moving);
+    let band = view.bands.next(view.extent()[1], plan.moved || plan.denoised);
     recorder.set_tag(view.bands.tag(&band));
     let matrices = CameraMatrices::of(view.camera(), view.extent());
     let constants = frame_constants(recorder, view, tables, &matrices, &plan)?;
@@ -62,7 +63,7 @@ pub(crate) fn record(
         passes.gbuffer.record(recorder, &scope, targets, parity)?;
     }
     let filled = view.history.map_or(0, |filled| 1 - filled);
-    let moving = plan.moving.then_some(Moving { filled, counters: &view.counters.device });
+    let moving = plan.denoised.then_some(Moving { filled, counters: &view.counters.device });
     match &passes.radiance {
         Radiance::Path(path) => path.record(recorder, &scope, targets, parity, moving)?,
         Radiance::Deferred(deferred) => deferred.record(recorder, &scope, targets, parity, moving)?,
@@ -70,7 +71,7 @@ pub(crate) fn record(
     if band.last && !plan.moving {
         passes.accumulate.record(recorder, &scope, targets, accumulator, &view.counters.device)?;
     }
-    let shown_history = if plan.moving { filled } else { view.history.unwrap_or(filled) };
+    let shown_history = if plan.denoised { filled } else { view.history.unwrap_or(filled) };
     // In the middle of a sample the display is made again only when the way it is shown has changed.
     let display = view.display_key();
     let mut displayed = None;
@@ -98,7 +99,7 @@ pub(crate) fn record(
     if !band.last {
         return Ok(());
     }
-    if plan.moving {
+    if plan.denoised {
         view.history = Some(filled);
     }
     if !plan.moving {
@@ -133,7 +134,9 @@ fn record_light_shadow(
 struct Plan {
     /// The camera or the scene moved: the frame must be whole, or a drag would never show one.
     moved: bool,
-    /// Shown denoised, not accumulated: something moved, or stills are denoised too.
+    /// Light is denoised: something moved, or stills are denoised too.
+    denoised: bool,
+    /// Shown and not accumulated.
     moving: bool,
     /// The past belongs to the last frame and may be reprojected.
     history: bool,
@@ -142,8 +145,9 @@ struct Plan {
 impl Plan {
     fn of(view: &View, what: Invalidation, denoises: bool) -> Self {
         let moved = matches!(what, Invalidation::Camera | Invalidation::Scene);
-        let moving = (moved || view.settings().denoise_stills) && denoises;
-        Self { moved, moving, history: moving && view.history.is_some() && view.previous.is_some() }
+        let denoised = (moved || view.settings().denoise_stills) && denoises;
+        let history = denoised && view.history.is_some() && view.previous.is_some();
+        Self { moved, denoised, moving: moved && denoised, history }
     }
 }
 
@@ -167,6 +171,7 @@ fn frame_constants(
     let mut flags = 0;
     for (set, flag) in [
         (matrices.orthographic, FRAME_ORTHOGRAPHIC),
+        (plan.denoised, FRAME_DENOISED),
         (plan.moving, FRAME_MOVING),
         (plan.history, FRAME_HISTORY),
         (settings.opaque_glass_shadows, FRAME_OPAQUE_GLASS),

@@ -269,6 +269,7 @@ impl Needs {
             self.shapes,
             self.lobes,
             self.ray_depth,
+            self.temporal,
         ];
         Specialization {
             values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),

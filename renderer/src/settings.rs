@@ -151,7 +151,7 @@ pub struct ViewSettings {
     pub temporal: bool,
     /// Denoise over space too; nothing without `temporal`.
     pub spatial: bool,
-    /// Denoise when nothing moves, too: frames are filtered and nothing is accumulated.
+    /// Denoise when nothing moves, too: the mean is that of denoised frames, and biased.
     pub denoise_stills: bool,
     /// Longest history while moving, frames.
     pub temporal_max_history: f32,

@@ -22,6 +22,12 @@ vec3 surface_lobe_tint(Surface surface) {
     return max(tint, vec3(TINT_MIN));
 }
 
+// Divisor of the light that a surface sends towards a mirror.
+vec3 surface_tint(Surface surface) {
+    vec3 tint = surface.mode == MODE_PBR ? surface_diffuse_albedo(surface) + surface_lobe_tint(surface) : surface.emissive;
+    return max(tint, vec3(TINT_MIN));
+}
+
 // Whether the surface shows the image of what its rays meet rather than light of its own.
 bool surface_shows_image(Surface surface) {
     bool coated = surface.metallic < 0.5 && !surface_transmits(surface);
@@ -29,14 +35,14 @@ bool surface_shows_image(Surface surface) {
         || (surface.mode == MODE_PBR && !coated && surface.roughness <= IMAGE_ROUGHNESS_MAX);
 }
 
-// How far behind the surface the image seems to lie, from the length of the ray: towards the surface as the lobe widens (dominant direction of GGX,
+// How far behind the surface the image seems to lie, as a share of the length of the ray: less as the lobe widens (dominant direction of GGX,
 // Lagarde and de Rousiers, "Moving Frostbite to PBR", 2014, listing 23, read as a share of the way).
-float image_distance(Surface surface, float ray_m) {
+float image_share(Surface surface) {
     if (surface.mode != MODE_PBR) {
-        return ray_m;
+        return 1.0;
     }
     float r = surface.roughness;
-    return r <= IMAGE_ROUGHNESS_MAX ? ray_m * (1.0 - r) * (sqrt(1.0 - r) + r) : 0.0;
+    return r <= IMAGE_ROUGHNESS_MAX ? (1.0 - r) * (sqrt(1.0 - r) + r) : 0.0;
 }
 
 #endif

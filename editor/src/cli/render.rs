@@ -113,7 +113,7 @@ enum DenoiseArg {
 }
 
 impl RenderArgs {
-    /// The picture is denoised, and so is no mean of samples.
+    /// The picture is to be denoised.
     fn denoises(&self) -> bool {
         self.denoise.is_some_and(|denoise| denoise != DenoiseArg::Off)
     }
@@ -268,17 +268,14 @@ pub(super) fn run(
         sampler: session.settings().sampler.name(),
         seed: session.settings().seed,
     };
-    // What a scene leaves out cannot be denoised: it was accumulated as ever.
-    let denoised = session.samples() == 0;
-    let (radiance, noise) = if denoised {
-        (session.read_frame()?, None)
-    } else {
-        let accumulated = session.read_back()?;
-        let noise = noise_of(&accumulated, metadata.samples);
-        (accumulated.mean, noise)
-    };
+    // What the scene has no need of was left out.
+    let left_out = &session.statistics().left_out;
+    let denoised = args.denoises() && left_out.iter().all(|left| left.what != "temporal denoising");
+    let accumulated = session.read_back()?;
+    // Frames that share their past do not tell how far they are from the truth.
+    let noise = if denoised { None } else { noise_of(&accumulated, metadata.samples) };
     match kind {
-        Kind::Exr => output::write_exr(&args.output, args.size, &radiance, &metadata)?,
+        Kind::Exr => output::write_exr(&args.output, args.size, &accumulated.mean, &metadata)?,
         Kind::Png => output::write_png(&args.output, args.size, &session.read_display()?)?,
     }
     report_validation(&device)?;
@@ -384,8 +381,7 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
         if frames.len() < TIMED_FRAMES && !times.is_empty() {
             frames.push(times.clone());
         }
-        // Frames that are denoised are not accumulated.
-        done = if args.denoises() { done + 1 } else { session.samples() };
+        done = session.samples();
         progress.set_position(done);
         // Looked at a few times only: reading back waits for the device.
         if let Some(target) = args.target_error

@@ -89,6 +89,8 @@ pub const FRAME_OPAQUE_GLASS: u32 = 8;
 pub const FRAME_PATHS_BEND: u32 = 16;
 /// [`super::Frame::flags`]: nothing has moved since the last frame, so its history is exact and not clamped.
 pub const FRAME_STEADY: u32 = 32;
+/// [`super::Frame::flags`]: light is kept apart, to be denoised.
+pub const FRAME_DENOISED: u32 = 64;
 
 /// [`super::Frame::tone_map`]: clamp.
 pub const TONE_MAP_LINEAR: u32 = 0;

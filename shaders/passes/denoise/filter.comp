@@ -19,28 +19,41 @@ struct Sum {
     float weight;
 };
 
-// Variance blurred over 3x3: that of one pixel is too uncertain to be compared by.
-vec3 variance_around(Frame frame, ivec2 at, Place place) {
-    vec3 sum = vec3(0.0);
-    vec3 total = vec3(0.0);
-    for (int y = -1; y <= 1; ++y) {
-        for (int x = -1; x <= 1; ++x) {
-            ivec2 p = at + ivec2(x, y);
-            if (inside(frame, p) && texelFetch(gbuffer_id, p, 0).xw == place.id) {
-                float weight = (x == 0 ? 0.5 : 0.25) * (y == 0 ? 0.5 : 0.25);
-                Signals signals = signals_at(frame, p);
-                sum += weight * vec3(signals.diffuse.a, signals.specular.a, signals.reflected.a);
-                total += weight;
-            }
-        }
-    }
-    return sum / max(total, vec3(1e-6));
+// What the pixels around say, of diffuse, specular and reflected light.
+struct Around {
+    vec3 variance;      // blurred over 3x3: that of one pixel is too uncertain to be compared by
+    vec3 luminance;     // of the pixel, no further out than its neighbours: a lone bright pixel is not what others are compared with
+};
+
+vec3 luminances(Signals signals) {
+    return vec3(luminance(signals.diffuse.rgb), luminance(signals.specular.rgb), luminance(signals.reflected.rgb));
 }
 
-void add_tap(inout Sum sum, vec4 value, vec4 centre, float deviation, float weight) {
-    float l = luminance(centre.rgb);
-    float off = abs(luminance(value.rgb) - l);
-    weight *= exp(-off / (DEVIATIONS * deviation + LEAST_SHARE * l + 1e-30));
+Around look_around(Frame frame, ivec2 at, Place place, Signals centre) {
+    vec3 variance = 0.25 * vec3(centre.diffuse.a, centre.specular.a, centre.reflected.a);
+    float total = 0.25;
+    vec3 least = vec3(FLOAT_MAX);
+    vec3 most = vec3(0.0);
+    for (int i = 0; i < 9; ++i) {
+        ivec2 offset = ivec2(i % 3, i / 3) - 1;
+        ivec2 p = at + offset;
+        if (i == 4 || !inside(frame, p) || texelFetch(gbuffer_id, p, 0).xw != place.id) {
+            continue;
+        }
+        Signals signals = signals_at(frame, p);
+        float weight = offset.x == 0 || offset.y == 0 ? 0.125 : 0.0625;
+        variance += weight * vec3(signals.diffuse.a, signals.specular.a, signals.reflected.a);
+        total += weight;
+        least = min(least, luminances(signals));
+        most = max(most, luminances(signals));
+    }
+    vec3 own = luminances(centre);
+    return Around(variance / total, total > 0.25 ? clamp(own, least, most) : own);
+}
+
+void add_tap(inout Sum sum, vec4 value, float expected, float deviation, float weight) {
+    float off = abs(luminance(value.rgb) - expected);
+    weight *= exp(-off / (DEVIATIONS * deviation + LEAST_SHARE * expected + 1e-30));
     sum.value += vec4(weight * value.rgb, weight * weight * value.a);
     sum.weight += weight;
 }
@@ -62,7 +75,8 @@ void main() {
         store(frame, at, centre);
         return;
     }
-    vec3 deviation = sqrt(variance_around(frame, at, place));
+    Around around = look_around(frame, at, place, centre);
+    vec3 deviation = sqrt(around.variance);
     const Sum nothing = Sum(vec4(0.0), 0.0);
     Sum diffuse = nothing;
     Sum specular = nothing;
@@ -79,9 +93,9 @@ void main() {
                 continue;
             }
             Signals tap = signals_at(frame, at + offset);
-            add_tap(diffuse, tap.diffuse, centre.diffuse, deviation.x, same.x);
-            add_tap(specular, tap.specular, centre.specular, deviation.y, same.x);
-            add_tap(brought, tap.reflected, centre.reflected, deviation.z, same.y);
+            add_tap(diffuse, tap.diffuse, around.luminance.x, deviation.x, same.x);
+            add_tap(specular, tap.specular, around.luminance.y, deviation.y, same.x);
+            add_tap(brought, tap.reflected, around.luminance.z, deviation.z, same.y);
         }
     }
     store(frame, at, Signals(result(diffuse, centre.diffuse), result(specular, centre.specular), result(brought, centre.reflected)));

@@ -29,6 +29,8 @@ const float DEPTH_OF_SLOPE = 0.5;
 const float DEPTH_OF_DEPTH = 0.01;
 // Likewise of what is mirrored.
 const float IMAGE_OF_DEPTH = 0.1;
+// Taps whose image is elsewhere stand in for a pixel that nothing else agrees with.
+const float IMAGE_LEAST = 0.01;
 
 struct Signals {
     vec4 diffuse;       // a: as the pass says
@@ -100,7 +102,7 @@ vec2 edge_weights(Place place, ivec2 p, ivec2 offset) {
     float off = abs(texelFetch(gbuffer_depth, p, 0).x - place.depth - change);
     float weight = pow(cosine, NORMAL_POWER) * exp(-off / (DEPTH_OF_SLOPE * abs(change) + DEPTH_OF_DEPTH * place.depth + 1e-30));
     float image_off = HAS_REFLECTED ? abs(texelFetch(image_of_surface, p, 0).z - place.image_depth) : 0.0;
-    return vec2(weight, weight * exp(-image_off / (IMAGE_OF_DEPTH * place.image_depth + 1e-30)));
+    return vec2(weight, weight * max(exp(-image_off / (IMAGE_OF_DEPTH * place.image_depth + 1e-30)), IMAGE_LEAST));
 }
 
 #endif

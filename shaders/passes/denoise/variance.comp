@@ -1,6 +1,6 @@
 // Pass denoise, first step: how noisy each signal is. In: the history of pass temporal and the moments of its luminance. Out: the signals, the variance
-// of their luminance in a: that of single samples over the number of frames, or, while those are few, the spread among neighbours
-// (Schied et al., "Spatiotemporal Variance-Guided Filtering", HPG 2017, section 4.2).
+// of their luminance in a: that of single samples over the number of frames; while those are few, of single samples around
+// (after Schied et al., "Spatiotemporal Variance-Guided Filtering", HPG 2017, section 4.2).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 
@@ -10,23 +10,26 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 1, binding = 10) uniform texture2D moments; // of diffuse and of specular light; those of reflected light are in image_of_surface.xy
 
-// Below this many frames the neighbours tell more.
-const float FEW_FRAMES = 4.0;
+// Up to this many frames, single samples vary as they do among the neighbours: pixels that met no light yet do not know of their noise.
+const float FEW_FRAMES = 16.0;
 const int REACH = 3;
 
+// Mean and mean square of the luminance of single samples: diffuse, specular, reflected.
 struct Spread {
-    vec3 weight;    // of diffuse, specular, reflected
     vec3 mean;
     vec3 mean_of_squares;
 };
 
-vec3 luminances(Signals signals) {
-    return vec3(luminance(signals.diffuse.rgb), luminance(signals.specular.rgb), luminance(signals.reflected.rgb));
+Spread spread_at(ivec2 p) {
+    vec4 direct = texelFetch(moments, p, 0);
+    vec2 brought = HAS_REFLECTED ? texelFetch(image_of_surface, p, 0).xy : vec2(0.0);
+    return Spread(vec3(direct.xz, brought.x), vec3(direct.yw, brought.y));
 }
 
-vec3 spread_among_neighbours(Frame frame, ivec2 at) {
+Spread spread_among_neighbours(Frame frame, ivec2 at) {
     Place place = place_at(frame, at);
-    Spread spread = Spread(vec3(0.0), vec3(0.0), vec3(0.0));
+    Spread sum = Spread(vec3(0.0), vec3(0.0));
+    vec3 total = vec3(0.0);
     for (int y = -REACH; y <= REACH; ++y) {
         for (int x = -REACH; x <= REACH; ++x) {
             ivec2 p = at + ivec2(x, y);
@@ -34,15 +37,14 @@ vec3 spread_among_neighbours(Frame frame, ivec2 at) {
                 continue;
             }
             vec3 weight = edge_weights(place, p, ivec2(x, y)).xxy;
-            vec3 l = luminances(signals_at(frame, p));
-            spread.weight += weight;
-            spread.mean += weight * l;
-            spread.mean_of_squares += weight * l * l;
+            Spread spread = spread_at(p);
+            sum.mean += weight * spread.mean;
+            sum.mean_of_squares += weight * spread.mean_of_squares;
+            total += weight;
         }
     }
-    vec3 total = max(spread.weight, vec3(1e-6));
-    vec3 mean = spread.mean / total;
-    return max(spread.mean_of_squares / total - mean * mean, vec3(0.0));
+    total = max(total, vec3(1e-6));
+    return Spread(sum.mean / total, sum.mean_of_squares / total);
 }
 
 void main() {
@@ -58,13 +60,14 @@ void main() {
     }
     Signals signals = signals_at(frame, at);
     vec3 frames = vec3(signals.diffuse.a, signals.specular.a, signals.reflected.a);
-    vec4 direct = texelFetch(moments, at, 0);
-    vec2 brought = HAS_REFLECTED ? texelFetch(image_of_surface, at, 0).xy : vec2(0.0);
-    vec3 mean = vec3(direct.xz, brought.x);
-    vec3 variance = max(vec3(direct.yw, brought.y) - mean * mean, vec3(0.0)) / max(frames, vec3(1.0));
-    if (any(lessThan(frames, vec3(FEW_FRAMES)))) {
-        variance = mix(variance, spread_among_neighbours(frame, at), lessThan(frames, vec3(FEW_FRAMES)));
+    Spread spread = spread_at(at);
+    bvec3 few = lessThan(frames, vec3(FEW_FRAMES));
+    if (any(few)) {
+        Spread around = spread_among_neighbours(frame, at);
+        spread.mean = mix(spread.mean, around.mean, few);
+        spread.mean_of_squares = mix(spread.mean_of_squares, around.mean_of_squares, few);
     }
+    vec3 variance = max(spread.mean_of_squares - spread.mean * spread.mean, vec3(0.0)) / max(frames, vec3(1.0));
     signals.diffuse.a = variance.x;
     signals.specular.a = variance.y;
     signals.reflected.a = variance.z;

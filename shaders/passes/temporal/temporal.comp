@@ -267,8 +267,8 @@ vec4 blend(Frame frame, vec3 current, Moments neighbours, float count, vec4 old)
     float length_frames = min(old.a + 1.0, max(frame.temporal_max_history, 1.0));
     bool clamps = count > 1.0 && (frame.flags & FRAME_STEADY) == 0u;
     vec3 past = clamps ? clamp(old.rgb, average - spread, average + spread) : old.rgb;
-    // A short history is mostly noise of single samples: neighbours stand in for the samples it lacks.
-    float help = clamp(1.0 - (length_frames - 1.0) / SHORT_HISTORY, 0.0, 1.0);
+    // A short history is mostly noise of single samples: neighbours stand in for the samples it lacks, unless the filter over space follows.
+    float help = push.argument0 != 0u ? 0.0 : clamp(1.0 - (length_frames - 1.0) / SHORT_HISTORY, 0.0, 1.0);
     vec3 fresh = mix(current, average, help);
     return vec4(old.a > 0.0 ? mix(past, fresh, 1.0 / length_frames) : fresh, length_frames);
 }

@@ -76,7 +76,8 @@ impl Mesh {
         let default_weights = vec![0.0; data.morph.len()];
         let (own_bounds, reach) = (Vec::new(), Vec::new());
         let shapes = None;
-        let mut mesh = Self { name, data, shapes, primitives, bounds: None, default_weights, own_bounds, reach };
+        let mut mesh =
+            Self { name, data, shapes, primitives, bounds: None, default_weights, own_bounds, reach };
         mesh.measure();
         mesh.update_bounds();
         if mesh.data.skin.is_some() || !mesh.data.morph.is_empty() {

@@ -29,8 +29,9 @@ const float DEPTH_OF_SLOPE = 0.5;
 const float DEPTH_OF_DEPTH = 0.01;
 // Likewise of what is mirrored.
 const float IMAGE_OF_DEPTH = 0.1;
-// Taps whose image is elsewhere stand in for a pixel that nothing else agrees with.
-const float IMAGE_LEAST = 0.01;
+// Least weight of taps whose image is elsewhere: in mirrors, and where surfaces bend or spread the image, so that its depth tells little.
+const float IMAGE_LEAST_MIRROR = 0.01;
+const float IMAGE_LEAST = 0.4;
 
 struct Signals {
     vec4 diffuse;       // a: as the pass says
@@ -45,6 +46,7 @@ struct Place {
     float depth;        // reverse: affine over the image where the surface is a plane
     vec2 slope;         // its change a pixel
     float image_depth;
+    float image_least;
 };
 
 // A path's light is whole: it has no specular signal.
@@ -89,6 +91,8 @@ Place place_at(Frame frame, ivec2 p) {
     place.depth = texelFetch(gbuffer_depth, p, 0).x;
     place.slope = vec2(slope_along(frame, p, ivec2(1, 0), place.depth), slope_along(frame, p, ivec2(0, 1), place.depth));
     place.image_depth = HAS_REFLECTED ? texelFetch(image_of_surface, p, 0).z : 0.0;
+    bool mirror = MaterialTable(SceneTable(frame.scene).scene.materials).at[place.id.y].mode == MODE_REFLECTIVE;
+    place.image_least = mirror ? IMAGE_LEAST_MIRROR : IMAGE_LEAST;
     return place;
 }
 
@@ -102,7 +106,7 @@ vec2 edge_weights(Place place, ivec2 p, ivec2 offset) {
     float off = abs(texelFetch(gbuffer_depth, p, 0).x - place.depth - change);
     float weight = pow(cosine, NORMAL_POWER) * exp(-off / (DEPTH_OF_SLOPE * abs(change) + DEPTH_OF_DEPTH * place.depth + 1e-30));
     float image_off = HAS_REFLECTED ? abs(texelFetch(image_of_surface, p, 0).z - place.image_depth) : 0.0;
-    return vec2(weight, weight * max(exp(-image_off / (IMAGE_OF_DEPTH * place.image_depth + 1e-30)), IMAGE_LEAST));
+    return vec2(weight, weight * max(exp(-image_off / (IMAGE_OF_DEPTH * place.image_depth + 1e-30)), place.image_least));
 }
 
 #endif

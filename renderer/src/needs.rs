@@ -7,7 +7,7 @@ use caustica_gpu::Specialization;
 
 use crate::delta::{Material, MaterialId, ShadingMode};
 use crate::measure::LeftOut;
-use crate::settings::{NeedsMode, Pipeline, Show, ViewSettings};
+use crate::settings::{NeedsMode, Pipeline, Primary, Show, ViewSettings};
 use crate::tables::{emits, has_alpha, is_opaque, transmits};
 
 /// What a scene holds, as far as it decides what is needed.
@@ -201,7 +201,7 @@ pub struct Needs {
 }
 
 impl Needs {
-    /// Decides for a scene and the settings of a view.
+    /// Decides for a scene and the settings of a view, whose [`Primary::Auto`] counts as raster.
     pub fn of(scene: &SceneSummary, settings: &ViewSettings) -> Self {
         let surfaces = &scene.surfaces;
         let rays = settings.pipeline != Pipeline::Raster;
@@ -234,7 +234,9 @@ impl Needs {
             spatial: temporal && settings.spatial && (all || noisy),
             motion: all || settings.show == Show::Motion || (temporal && noisy),
             shapes: all || scene.shapes,
-            primary_rays: paths || settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
+            primary_rays: paths
+                || settings.pipeline == Pipeline::Raytraced
+                || (rays && (scene.shapes || settings.primary == Primary::Rays)),
             paths,
             // Not with `all` alone: reading the textures of lobes takes lavapipe a minute to compile, in every general variant.
             lobes: surfaces.lobes,
@@ -324,7 +326,13 @@ impl Needs {
             (
                 settings.pipeline != Pipeline::Hybrid || !self.primary_rays,
                 "raster of primary surfaces",
-                "the scene holds spheres or boxes, which rays meet without drawing each",
+                match settings.primary {
+                    _ if self.shapes => {
+                        "the scene holds spheres or boxes, which rays meet without drawing each"
+                    }
+                    Primary::Auto => "rays find the first surfaces faster, by the profile of the device",
+                    _ => "rays find the first surfaces, by the settings",
+                },
             ),
             (self.temporal, "temporal denoising", why_not_denoised("a still image accumulates its samples")),
             (
@@ -413,6 +421,18 @@ mod tests {
         assert_eq!(tally.summary(), summary(&[rough(), glass, smooth]).surfaces);
         ids.iter().for_each(|id| tally.set(*id, None));
         assert_eq!(tally.summary(), SurfaceSummary::default());
+    }
+
+    #[test]
+    fn rays_find_the_first_surfaces_where_they_are_asked_to() {
+        let rays = ViewSettings { primary: Primary::Rays, ..ViewSettings::default() };
+        let raster = ViewSettings { primary: Primary::Raster, ..ViewSettings::default() };
+        let (plain, shapes) = (summary(&[rough()]), SceneSummary { shapes: true, ..summary(&[rough()]) });
+        assert!(Needs::of(&plain, &rays).primary_rays && !Needs::of(&plain, &raster).primary_rays);
+        assert!(!Needs::of(&plain, &ViewSettings::default()).primary_rays);
+        assert!(Needs::of(&shapes, &raster).primary_rays);
+        let no_rays = ViewSettings { pipeline: Pipeline::Raster, ..rays };
+        assert!(!Needs::of(&plain, &no_rays).primary_rays);
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::measure::Statistics;
 use crate::needs::Needs;
 use crate::passes::{Builder, PassSet, ScenePasses};
 use crate::sampling::Sampling;
-use crate::settings::{Pipeline, ViewSettings};
+use crate::settings::{Pipeline, Primary, ViewSettings};
 use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
 use crate::summary::Summary;
 use crate::tables::{Changed, Tables};
@@ -31,6 +31,8 @@ pub struct RendererOptions {
     pub shaders: Option<PathBuf>,
     /// When acceleration structures are built, refitted and compacted.
     pub acceleration: AccelPolicy,
+    /// Rays find the first surfaces faster than the rasteriser does: what [`Primary::Auto`] means.
+    pub primary_rays_pay: bool,
 }
 
 /// What is seen through a pixel.
@@ -61,6 +63,7 @@ pub struct Renderer {
     library: ShaderLibrary,
     tables: Tables,
     accel: Accel,
+    primary_rays_pay: bool,
     scene_passes: ScenePasses,
     views: BTreeMap<ViewId, View>,
     next_view: u32,
@@ -88,6 +91,7 @@ impl Renderer {
             library,
             tables,
             accel: Accel::new(device, options.acceleration)?,
+            primary_rays_pay: options.primary_rays_pay,
             views: BTreeMap::new(),
             next_view: 0,
             passes: HashMap::new(),
@@ -212,7 +216,11 @@ impl Renderer {
     pub fn render(&mut self, recorder: &mut Recorder, id: ViewId) -> Result<()> {
         let view = self.view(id)?;
         let settings = view.settings().clone();
-        let needs = Needs::of(self.summary.scene(), &settings);
+        let primary = match settings.primary {
+            Primary::Auto if self.primary_rays_pay => Primary::Rays,
+            primary => primary,
+        };
+        let needs = Needs::of(self.summary.scene(), &ViewSettings { primary, ..settings.clone() });
         let key = (settings.pipeline, needs, view.sampling());
         self.prepare_passes(key, id, recorder.slot())?;
         if settings.multiple_scattering {

@@ -68,6 +68,33 @@ impl ToneMap {
     }
 }
 
+/// How `hybrid` finds the first surfaces. The picture is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Primary {
+    /// As is faster on the device, by its profile.
+    #[default]
+    Auto,
+    /// By the rasteriser; by rays where the scene holds spheres or boxes.
+    Raster,
+    /// By rays.
+    Rays,
+}
+
+impl Primary {
+    /// Every way, in the order of menus.
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Raster, Self::Rays];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Raster => "raster",
+            Self::Rays => "rays",
+        }
+    }
+}
+
 /// Where the random numbers of a picture come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -125,6 +152,8 @@ pub struct ViewSettings {
     pub show_light: Option<LightId>,
     /// Special or general variants.
     pub needs: NeedsMode,
+    /// How `hybrid` finds the first surfaces.
+    pub primary: Primary,
     /// Exposure in stops; 0 leaves radiance 1 at 1.
     pub exposure_ev: f32,
     /// Tone map.
@@ -166,6 +195,7 @@ impl Default for ViewSettings {
             show: Show::Image,
             show_light: None,
             needs: NeedsMode::Auto,
+            primary: Primary::Auto,
             exposure_ev: 0.0,
             tone_map: ToneMap::Neutral,
             sampler: Sampler::Sobol,

@@ -54,7 +54,8 @@ impl Studio {
 
     fn make(extent: [u32; 2], settings: ViewSettings, window: bool, acceleration: AccelPolicy) -> Self {
         let mut session = session();
-        let options = RendererOptions { shaders: shaders_under_test(), acceleration };
+        let options =
+            RendererOptions { shaders: shaders_under_test(), acceleration, ..RendererOptions::default() };
         let mut renderer = Renderer::new(&session.device, &mut session.frames, &options).expect("a renderer");
         let view = renderer.create_view(extent, settings, window).expect("a view");
         Self { renderer, view, session }

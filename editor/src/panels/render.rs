@@ -1,7 +1,7 @@
 //! Settings of the picture: environment, pipeline, exposure, sampling. Enters and leaves: the view's settings.
 
 use caustica_renderer::delta::LightId;
-use caustica_renderer::{NeedsMode, Pipeline, Sampler, Sampling, Show, ToneMap, ViewSettings};
+use caustica_renderer::{NeedsMode, Pipeline, Primary, Sampler, Sampling, Show, ToneMap, ViewSettings};
 use egui::{DragValue, Slider, Ui};
 
 use super::{Cx, field, section};
@@ -86,6 +86,18 @@ fn pipeline_tip(pipeline: Pipeline) -> &'static str {
 
 fn picture(session: &Session, ui: &mut Ui, settings: &mut ViewSettings) {
     field(ui, "Pipeline", "How the picture is made", |ui| pipeline_menu(ui, &mut settings.pipeline));
+    if settings.pipeline == Pipeline::Hybrid {
+        field(ui, "First surfaces", "How they are found; automatic is what is faster on this device", |ui| {
+            egui::ComboBox::from_id_salt("primary").selected_text(primary_name(settings.primary)).show_ui(
+                ui,
+                |ui| {
+                    for choice in Primary::ALL {
+                        ui.selectable_value(&mut settings.primary, choice, primary_name(choice));
+                    }
+                },
+            );
+        });
+    }
     field(ui, "Show", "The finished picture or a step on the way", |ui| show_menu(ui, &mut settings.show));
     if settings.show == Show::Shadow {
         field(ui, "Light", "The light whose shadow is shown", |ui| {
@@ -111,6 +123,14 @@ fn picture(session: &Session, ui: &mut Ui, settings: &mut ViewSettings) {
             },
         );
     });
+}
+
+fn primary_name(primary: Primary) -> &'static str {
+    match primary {
+        Primary::Auto => "Automatic",
+        Primary::Raster => "Raster",
+        Primary::Rays => "Rays",
+    }
 }
 
 fn tone_name(tone_map: ToneMap) -> &'static str {

@@ -7,12 +7,12 @@ use crate::accel::Accel;
 use crate::delta::Invalidation;
 use crate::error::Result;
 use crate::gpu_types::{
-    self, FRAME_DENOISED, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC,
-    FRAME_PATHS_BEND, FRAME_STEADY,
+    self, FRAME_DENOISED, FRAME_HALF_REFLECTIONS, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS,
+    FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND, FRAME_STEADY,
 };
 use crate::needs::Needs;
 use crate::passes::{Moving, PassSet, Radiance, Scope, Shown};
-use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
+use crate::settings::{Pipeline, ReflectionRate, Show, ToneMap, ViewSettings};
 use crate::tables::Tables;
 use crate::view::{CameraMatrices, Targets, View};
 
@@ -63,7 +63,9 @@ pub(crate) fn record(
         passes.gbuffer.record(recorder, &scope, targets, parity)?;
     }
     let filled = view.history.map_or(0, |filled| 1 - filled);
-    let moving = plan.denoised.then_some(Moving { filled, counters: &view.counters.device });
+    let half_reflections = half_reflections(view.settings());
+    let moving =
+        plan.denoised.then_some(Moving { filled, counters: &view.counters.device, half_reflections });
     match &passes.radiance {
         Radiance::Path(path) => path.record(recorder, &scope, targets, parity, moving)?,
         Radiance::Deferred(deferred) => deferred.record(recorder, &scope, targets, parity, moving)?,
@@ -172,6 +174,7 @@ fn frame_constants(
     for (set, flag) in [
         (matrices.orthographic, FRAME_ORTHOGRAPHIC),
         (plan.denoised, FRAME_DENOISED),
+        (plan.denoised && half_reflections(settings), FRAME_HALF_REFLECTIONS),
         (plan.moving, FRAME_MOVING),
         (plan.history, FRAME_HISTORY),
         (settings.opaque_glass_shadows, FRAME_OPAQUE_GLASS),
@@ -216,6 +219,11 @@ fn frame_constants(
         selection_count: view.selection.len() as u32 * 32,
         pad0: 0,
     })
+}
+
+/// One pixel of each 2 x 2 traces reflected light in frames that are denoised.
+fn half_reflections(settings: &ViewSettings) -> bool {
+    settings.reflection_rate == ReflectionRate::Half && settings.pipeline != Pipeline::Path
 }
 
 /// Stages the bit set of the outlined instances; 0 when nothing is selected.

@@ -7,7 +7,7 @@ use caustica_gpu::Specialization;
 
 use crate::delta::{Material, MaterialId, ShadingMode};
 use crate::measure::LeftOut;
-use crate::settings::{NeedsMode, Pipeline, Primary, Show, ViewSettings};
+use crate::settings::{NeedsMode, Pipeline, Primary, ReflectionRate, Show, ViewSettings};
 use crate::tables::{emits, has_alpha, is_opaque, transmits};
 
 /// What a scene holds, as far as it decides what is needed.
@@ -254,6 +254,11 @@ impl Needs {
         self.shadow_rays && (self.reflection || self.refraction)
     }
 
+    /// Whether reflected light is denoised, and so can be traced by some pixels for others.
+    fn halves_reflections(&self) -> bool {
+        self.temporal && self.secondary_rays() && !self.paths
+    }
+
     /// Constants of `shaders/shared/needs.glsl`, in its order.
     pub fn specialization(&self) -> Specialization {
         let values = [
@@ -300,7 +305,7 @@ impl Needs {
                 switched_off
             }
         };
-        let list: [(bool, &str, &str); 17] = [
+        let list: [(bool, &str, &str); 18] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -319,6 +324,11 @@ impl Needs {
                 why_no_secondary("no surface is smooth enough to mirror"),
             ),
             (rays && self.refraction, "refraction rays", why_no_secondary("no surface lets light pass")),
+            (
+                settings.reflection_rate == ReflectionRate::Full || self.halves_reflections(),
+                "reflections at half the rate",
+                if self.paths { "a path carries all light" } else { "no reflected light is denoised" },
+            ),
             (self.emission, "emissive target", "no surface emits"),
             (self.motion, "motion vectors", "nothing is denoised over time"),
             (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),

@@ -95,6 +95,17 @@ impl Primary {
     }
 }
 
+/// How many pixels trace reflected and refracted light in frames of `hybrid` and `raytraced` that are denoised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ReflectionRate {
+    /// Each.
+    #[default]
+    Full,
+    /// One of each 2 x 2, in turns.
+    Half,
+}
+
 /// Where the random numbers of a picture come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -174,6 +185,8 @@ pub struct ViewSettings {
     pub multiple_scattering: bool,
     /// Surfaces up to this roughness trace their specular lobe; rougher ones see the environment only.
     pub reflection_roughness_max: f32,
+    /// How many pixels trace reflected light while it is denoised.
+    pub reflection_rate: ReflectionRate,
     /// Shadow rays stop at glass instead of passing it tinted and unbent.
     pub opaque_glass_shadows: bool,
     /// Denoise over time while things move. Off for headless stills, which accumulate anyway.
@@ -206,6 +219,7 @@ impl Default for ViewSettings {
             path_depth: None,
             multiple_scattering: false,
             reflection_roughness_max: 0.5,
+            reflection_rate: ReflectionRate::Full,
             opaque_glass_shadows: false,
             temporal: true,
             spatial: true,

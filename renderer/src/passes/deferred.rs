@@ -41,7 +41,10 @@ impl Deferred {
             return self.shading.record(recorder, scope, targets, parity, direct);
         };
         if denoise.composes() {
-            self.shading.record(recorder, scope, targets, parity, None)?;
+            let [width, height] = scope.extent.map(|side| side.div_ceil(2));
+            let quads = Scope { extent: [width, height], rows: 0..height, ..*scope };
+            let traced = if moving.half_reflections { &quads } else { scope };
+            self.shading.record(recorder, traced, targets, parity, None)?;
         }
         let Some(signals) = denoise.record(recorder, scope, targets, parity, moving)? else { return Ok(()) };
         if denoise.composes() {

@@ -17,6 +17,8 @@ pub(crate) struct Moving<'a> {
     pub(crate) filled: usize,
     /// Counter of dropped samples.
     pub(crate) counters: &'a Buffer,
+    /// One pixel of each 2 x 2 traces reflected light.
+    pub(crate) half_reflections: bool,
 }
 
 /// Denoised light: demodulated direct light, diffuse and specular, and what rays bring.

@@ -7,9 +7,10 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "passes/shading/shading_pixel.glsl"
+#include "lib/demodulation.glsl"
 
 layout(set = 1, binding = 9) uniform texture2D reflected;
-layout(set = 1, binding = 10) uniform texture2D reflected_tint;
+layout(set = 1, binding = 10) uniform texture2D reflected_tint;   // of a path the whole tint, else that of the image alone
 
 vec3 light_visibility(vec3 origin, vec3 direction, float t_max_m, uint seed) {
     return vec3(1.0);
@@ -28,15 +29,16 @@ void main() {
         return; // the background is there already
     }
     Surface surface = first_surface(frame, scene, pixel, id);
+    vec3 passed = seen_through(scene, surface, id.w, camera_distance(frame, pixel, surface));
     vec3 brought = texelFetch(reflected, at, 0).rgb;
+    vec3 tint = texelFetch(reflected_tint, at, 0).rgb;
     vec3 direct;
     if ((frame.flags & FRAME_PATHS_BEND) != 0u) {
         brought += texelFetch(direct_diffuse, at, 0).rgb;
         direct = surface.emissive;
     } else {
+        tint *= passed * surface_lobe_tint(surface);
         direct = first_light(surface, pixel);
     }
-    direct *= seen_through(scene, surface, id.w, camera_distance(frame, pixel, surface));
-    vec3 radiance = direct + texelFetch(reflected_tint, at, 0).rgb * brought;
-    imageStore(shaded, at, vec4(radiance, 1.0));
+    imageStore(shaded, at, vec4(passed * direct + tint * brought, 1.0));
 }

@@ -1,7 +1,7 @@
 // Pass temporal: light over time while the view moves. In: this frame's signals, the last frame's history, both G-buffers' depth and normal.
 // Out: the new history, its length in frames in a; of each signal the mean and mean square of its luminance, for pass denoise. Old light is taken
 // from where the surface was, what mirrors and glass show from where its image was, from taps that saw the same, and clamped to what the neighbours
-// receive now. What is not finite never enters. Knows no material.
+// receive now. What is not finite never enters. Knows of materials whether they mirror.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
@@ -19,7 +19,7 @@ layout(set = 1, binding = 1) uniform utexture2D gbuffer_normal;
 layout(set = 1, binding = 2) uniform texture2D gbuffer_motion;
 layout(set = 1, binding = 3) uniform texture2D direct_diffuse;
 layout(set = 1, binding = 4) uniform texture2D direct_specular;
-layout(set = 1, binding = 5) uniform texture2D reflected;           // a: how far behind the surface its image is, metres
+layout(set = 1, binding = 5) uniform texture2D reflected;           // a: how far behind the surface its image is, metres; below 0: no ray
 layout(set = 1, binding = 6) uniform texture2D previous_depth;
 layout(set = 1, binding = 7) uniform utexture2D previous_normal;
 layout(set = 1, binding = 8) uniform texture2D previous_diffuse;
@@ -59,6 +59,8 @@ struct Neighbourhood {
     Moments specular;
     Moments reflected;
     float count;
+    float reflected_count;  // of pixels that traced rays
+    float image_m;          // sum over those
 };
 
 // What one pixel holds of its past or present.
@@ -98,7 +100,7 @@ vec3 direct_specular_at(Frame frame, ivec2 at) {
 // The pixels of 3x3 that show the same instance under a similar normal and whose light is finite.
 Neighbourhood gather(Frame frame, ivec2 at, uint instance, vec3 normal) {
     const Moments nothing = Moments(vec3(0.0), vec3(0.0));
-    Neighbourhood n = Neighbourhood(nothing, nothing, nothing, 0.0);
+    Neighbourhood n = Neighbourhood(nothing, nothing, nothing, 0.0, 0.0, 0.0);
     for (int y = -1; y <= 1; ++y) {
         for (int x = -1; x <= 1; ++x) {
             ivec2 p = at + ivec2(x, y);
@@ -109,12 +111,16 @@ Neighbourhood gather(Frame frame, ivec2 at, uint instance, vec3 normal) {
                 && dot(octahedral_decode(texelFetch(gbuffer_normal, p, 0).x), normal) > SAME_NORMAL;
             vec3 diffuse = texelFetch(direct_diffuse, p, 0).rgb;
             vec3 specular = direct_specular_at(frame, p);
-            vec3 brought = HAS_REFLECTED ? texelFetch(reflected, p, 0).rgb : vec3(0.0);
-            if (same && is_finite(diffuse) && is_finite(specular) && is_finite(brought)) {
+            vec4 brought = HAS_REFLECTED ? texelFetch(reflected, p, 0) : vec4(0.0);
+            if (same && is_finite(diffuse) && is_finite(specular) && is_finite(brought.rgb)) {
                 add_moment(n.diffuse, diffuse);
                 add_moment(n.specular, specular);
-                add_moment(n.reflected, brought);
                 n.count += 1.0;
+                if (brought.a >= 0.0) {
+                    add_moment(n.reflected, brought.rgb);
+                    n.image_m += brought.a;
+                    n.reflected_count += 1.0;
+                }
             }
         }
     }
@@ -184,8 +190,8 @@ float tap_weight(Frame frame, Taps taps, int i, vec3 normal, out ivec2 p) {
 // A sum of weights too small to divide by belongs to taps that are nearly a whole pixel away.
 const float LEAST_WEIGHT = 1.0 / 64.0;
 
-// Direct light where the surface was: bilinear over the taps that saw it.
-void reproject_surface(Frame frame, uvec2 pixel, Seen seen, inout Signals old) {
+// Light where the surface was: bilinear over the taps that saw it. with_reflected: reflected light too, where its image has no place of its own.
+void reproject_surface(Frame frame, uvec2 pixel, Seen seen, bool with_reflected, inout Signals old) {
     vec4 clip = frame.previous_clip_from_render * vec4(seen.previous, 1.0);
     Taps taps = taps_at(frame, vec2(pixel) + 0.5 - texelFetch(gbuffer_motion, ivec2(pixel), 0).xy);
     if (clip.w <= 0.0 || !taps.inside) {
@@ -195,6 +201,7 @@ void reproject_surface(Frame frame, uvec2 pixel, Seen seen, inout Signals old) {
     float tolerance = depth_tolerance(frame, depth, abs(dot(seen.geometric_normal, seen.direction)));
     Signals sum = NO_SIGNALS;
     float total = 0.0;
+    float reflected_total = 0.0;
     for (int i = 0; i < 4; ++i) {
         ivec2 p;
         float weight = tap_weight(frame, taps, i, seen.normal, p);
@@ -209,6 +216,16 @@ void reproject_surface(Frame frame, uvec2 pixel, Seen seen, inout Signals old) {
             sum.moments += weight * texelFetch(previous_moments, p, 0);
             total += weight;
         }
+        vec4 light = with_reflected ? texelFetch(previous_reflected, p, 0) : vec4(0.0);
+        if (light.a > 0.0 && is_finite(light)) {
+            sum.reflected += weight * light;
+            sum.image_moments += weight * texelFetch(previous_image, p, 0).xy;
+            reflected_total += weight;
+        }
+    }
+    if (reflected_total > LEAST_WEIGHT) {
+        old.reflected = sum.reflected / reflected_total;
+        old.image_moments = sum.image_moments / reflected_total;
     }
     if (total > LEAST_WEIGHT) {
         old.diffuse = sum.diffuse / total;
@@ -218,7 +235,7 @@ void reproject_surface(Frame frame, uvec2 pixel, Seen seen, inout Signals old) {
 }
 
 // The image behind the surface: a mirror's lies on the straight line behind it, and so does what a sheet of glass shows; what curved surfaces show is
-// elsewhere, and found by its depth or not at all.
+// elsewhere, and found by its depth or taken to move with the surface.
 vec3 image_position(Seen seen, float image_m) {
     return seen.position + seen.direction * min(image_m, IMAGE_FAR * seen.distance_m);
 }
@@ -262,13 +279,13 @@ void reproject_image(Frame frame, uvec2 pixel, Seen seen, float image_m, inout S
 
 // New history of one signal. `old.a`: its length, 0 for none.
 vec4 blend(Frame frame, vec3 current, Moments neighbours, float count, vec4 old) {
-    vec3 average = mean(neighbours, count);
-    vec3 spread = CLAMP_DEVIATIONS * deviation(neighbours, count);
+    vec3 average = mean(neighbours, max(count, 1.0));
+    vec3 spread = CLAMP_DEVIATIONS * deviation(neighbours, max(count, 1.0));
     float length_frames = min(old.a + 1.0, max(frame.temporal_max_history, 1.0));
     bool clamps = count > 1.0 && (frame.flags & FRAME_STEADY) == 0u;
     vec3 past = clamps ? clamp(old.rgb, average - spread, average + spread) : old.rgb;
     // A short history is mostly noise of single samples: neighbours stand in for the samples it lacks, unless the filter over space follows.
-    float help = push.argument0 != 0u ? 0.0 : clamp(1.0 - (length_frames - 1.0) / SHORT_HISTORY, 0.0, 1.0);
+    float help = push.argument0 != 0u || count < 1.0 ? 0.0 : clamp(1.0 - (length_frames - 1.0) / SHORT_HISTORY, 0.0, 1.0);
     vec3 fresh = mix(current, average, help);
     return vec4(old.a > 0.0 ? mix(past, fresh, 1.0 / length_frames) : fresh, length_frames);
 }
@@ -306,16 +323,24 @@ void main() {
         return;
     }
     Seen seen = seen_at(frame, scene, pixel, id);
+    Neighbourhood neighbours = gather(frame, at, id.x, seen.normal);
     vec4 brought = HAS_REFLECTED ? texelFetch(reflected, at, 0) : vec4(0.0);
+    bool traced = brought.a >= 0.0;
+    if (!traced) {
+        // Another pixel's turn: the neighbours that had theirs stand in.
+        float count = max(neighbours.reflected_count, 1.0);
+        brought = vec4(neighbours.reflected.sum, neighbours.image_m) / count;
+    }
     Signals old = NO_SIGNALS;
     if ((frame.flags & FRAME_HISTORY) != 0u) {
-        reproject_surface(frame, pixel, seen, old);
+        // What bends or spreads an image gives it no place that could be found again; a mirror's is exact while nothing moves.
+        bool mirror = MaterialTable(scene.materials).at[id.w].mode == MODE_REFLECTIVE;
+        reproject_surface(frame, pixel, seen, HAS_REFLECTED && (!mirror || (frame.flags & FRAME_STEADY) != 0u), old);
         if (HAS_REFLECTED) {
             reproject_image(frame, pixel, seen, brought.a, old);
         }
     }
     float depth = image_depth(frame, seen, brought.a);
-    Neighbourhood neighbours = gather(frame, at, id.x, seen.normal);
     vec3 diffuse = texelFetch(direct_diffuse, at, 0).rgb;
     vec3 specular = direct_specular_at(frame, at);
     bool finite = is_finite(diffuse) && is_finite(specular) && is_finite(brought.rgb);
@@ -329,14 +354,18 @@ void main() {
     if (!finite) {
         diffuse = mean(neighbours.diffuse, neighbours.count);
         specular = mean(neighbours.specular, neighbours.count);
-        brought.rgb = mean(neighbours.reflected, neighbours.count);
+        brought.rgb = mean(neighbours.reflected, max(neighbours.reflected_count, 1.0));
     }
     Signals light;
     light.diffuse = blend(frame, diffuse, neighbours.diffuse, neighbours.count, old.diffuse);
     light.specular = blend(frame, specular, neighbours.specular, neighbours.count, old.specular);
-    light.reflected = blend(frame, brought.rgb, neighbours.reflected, neighbours.count, old.reflected);
+    light.reflected = blend(frame, brought.rgb, neighbours.reflected, neighbours.reflected_count, old.reflected);
     light.moments.xy = blend_moments(diffuse, old.moments.xy, light.diffuse.a);
     light.moments.zw = blend_moments(specular, old.moments.zw, light.specular.a);
     light.image_moments = blend_moments(brought.rgb, old.image_moments, light.reflected.a);
+    if (!traced && old.reflected.a > 0.0) {
+        light.reflected = old.reflected; // its own past is nearer than what stands in
+        light.image_moments = old.image_moments;
+    }
     store(frame, at, light, depth);
 }

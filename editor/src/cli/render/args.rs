@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use caustica_renderer::{NeedsMode, Pipeline, Primary, Sampler, Show, ToneMap, ViewSettings};
+use caustica_renderer::{NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Show, ToneMap, ViewSettings};
 use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
 
@@ -60,6 +60,9 @@ pub(in crate::cli) struct RenderArgs {
     /// First sample of a set that is rendered in parts
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 47))]
     pub(super) sample_offset: u64,
+    /// With --denoise, which pixels trace reflected light in a frame: each, or one of 2x2 in turns
+    #[arg(long, value_enum)]
+    reflection_rate: Option<RateArg>,
     /// How `hybrid` finds the first surfaces: `auto` as is faster on the device, by its profile
     #[arg(long, value_enum)]
     primary: Option<PrimaryArg>,
@@ -106,6 +109,12 @@ impl RenderArgs {
     pub(super) fn denoises(&self) -> bool {
         self.denoise.is_some_and(|denoise| denoise != DenoiseArg::Off)
     }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum RateArg {
+    Full,
+    Half,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -209,6 +218,10 @@ pub(super) fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSe
         needs: args.needs.map_or(of_project.needs, |needs| match needs {
             NeedsArg::Auto => NeedsMode::Auto,
             NeedsArg::All => NeedsMode::All,
+        }),
+        reflection_rate: args.reflection_rate.map_or(of_project.reflection_rate, |rate| match rate {
+            RateArg::Full => ReflectionRate::Full,
+            RateArg::Half => ReflectionRate::Half,
         }),
         primary: args.primary.map_or(of_project.primary, |primary| match primary {
             PrimaryArg::Auto => Primary::Auto,

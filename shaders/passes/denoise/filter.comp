@@ -9,7 +9,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "passes/denoise/signals.glsl"
 
 // Taps differ by the noise when their luminance differs by this many standard deviations.
-const float DEVIATIONS = 2.5;
+const float DEVIATIONS = 4.0;
 // And by this share of the luminance: where no noise is left, rounding is.
 const float LEAST_SHARE = 1e-3;
 const float SPLINE[3] = float[3](3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0);

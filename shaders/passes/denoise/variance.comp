@@ -13,6 +13,9 @@ layout(set = 1, binding = 10) uniform texture2D moments; // of diffuse and of sp
 // Up to this many frames, single samples vary as they do among the neighbours: pixels that met no light yet do not know of their noise.
 const float FEW_FRAMES = 16.0;
 const int REACH = 3;
+// Variance is raised where it is this many times the square of the mean, and by how much at the most.
+const float SPIKY = 4.0;
+const float MOST_SPIKY = 16.0;
 
 // Mean and mean square of the luminance of single samples: diffuse, specular, reflected.
 struct Spread {
@@ -68,6 +71,8 @@ void main() {
         spread.mean_of_squares = mix(spread.mean_of_squares, around.mean_of_squares, few);
     }
     vec3 variance = max(spread.mean_of_squares - spread.mean * spread.mean, vec3(0.0)) / max(frames, vec3(1.0));
+    // Where few samples bring most of the light, each differs from all others by more than deviations tell, and must not be left out for it.
+    variance *= clamp(variance / max(SPIKY * spread.mean * spread.mean, vec3(1e-30)), vec3(1.0), vec3(MOST_SPIKY));
     signals.diffuse.a = variance.x;
     signals.specular.a = variance.y;
     signals.reflected.a = variance.z;

@@ -86,7 +86,11 @@ impl Session {
         let mut frames = Frames::new(device)?;
         let profile = DeviceProfile::in_force(device.name(), device.driver(), device.kind());
         let acceleration = AccelPolicy::of(&profile.profile, options.window);
-        let renderer_options = RendererOptions { shaders: options.shaders, acceleration };
+        let renderer_options = RendererOptions {
+            shaders: options.shaders,
+            acceleration,
+            primary_rays_pay: profile.profile.primary_rays_pay(),
+        };
         let mut renderer = Renderer::new(device, &mut frames, &renderer_options)?;
         let view = renderer.create_view(options.extent, options.settings, options.window)?;
         if options.window {

@@ -7,11 +7,12 @@ use crate::accel::Accel;
 use crate::delta::Invalidation;
 use crate::error::Result;
 use crate::gpu_types::{
-    self, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS, FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND,
+    self, FRAME_DENOISED, FRAME_HALF_REFLECTIONS, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS,
+    FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND, FRAME_STEADY,
 };
 use crate::needs::Needs;
-use crate::passes::{PassSet, Radiance, Scope, Shown};
-use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
+use crate::passes::{Moving, PassSet, Radiance, Scope, Shown};
+use crate::settings::{Pipeline, ReflectionRate, Show, ToneMap, ViewSettings};
 use crate::tables::Tables;
 use crate::view::{CameraMatrices, Targets, View};
 
@@ -35,8 +36,8 @@ pub(crate) fn record(
     if what == Invalidation::Everything {
         view.history = None;
     }
-    let plan = Plan::of(view, what, needs);
-    let band = view.bands.next(view.extent()[1], plan.moved);
+    let plan = Plan::of(view, what, passes.radiance.denoises());
+    let band = view.bands.next(view.extent()[1], plan.moved || plan.denoised);
     recorder.set_tag(view.bands.tag(&band));
     let matrices = CameraMatrices::of(view.camera(), view.extent());
     let constants = frame_constants(recorder, view, tables, &matrices, &plan)?;
@@ -62,17 +63,17 @@ pub(crate) fn record(
         passes.gbuffer.record(recorder, &scope, targets, parity)?;
     }
     let filled = view.history.map_or(0, |filled| 1 - filled);
+    let half_reflections = half_reflections(view.settings());
+    let moving =
+        plan.denoised.then_some(Moving { filled, counters: &view.counters.device, half_reflections });
     match &passes.radiance {
-        Radiance::Path(path) => path.record(recorder, &scope, targets)?,
-        Radiance::Deferred(deferred) => {
-            let past = plan.moving.then_some((filled, &view.counters.device));
-            deferred.record(recorder, &scope, targets, parity, past)?;
-        }
+        Radiance::Path(path) => path.record(recorder, &scope, targets, parity, moving)?,
+        Radiance::Deferred(deferred) => deferred.record(recorder, &scope, targets, parity, moving)?,
     }
     if band.last && !plan.moving {
         passes.accumulate.record(recorder, &scope, targets, accumulator, &view.counters.device)?;
     }
-    let shown_history = if plan.moving { filled } else { view.history.unwrap_or(filled) };
+    let shown_history = if plan.denoised { filled } else { view.history.unwrap_or(filled) };
     // In the middle of a sample the display is made again only when the way it is shown has changed.
     let display = view.display_key();
     let mut displayed = None;
@@ -100,7 +101,7 @@ pub(crate) fn record(
     if !band.last {
         return Ok(());
     }
-    if plan.moving && passes.radiance.denoises() {
+    if plan.denoised {
         view.history = Some(filled);
     }
     if !plan.moving {
@@ -135,17 +136,20 @@ fn record_light_shadow(
 struct Plan {
     /// The camera or the scene moved: the frame must be whole, or a drag would never show one.
     moved: bool,
-    /// Shown denoised, not accumulated: something moved.
+    /// Light is denoised: something moved, or stills are denoised too.
+    denoised: bool,
+    /// Shown and not accumulated.
     moving: bool,
     /// The past belongs to the last frame and may be reprojected.
     history: bool,
 }
 
 impl Plan {
-    fn of(view: &View, what: Invalidation, needs: Needs) -> Self {
+    fn of(view: &View, what: Invalidation, denoises: bool) -> Self {
         let moved = matches!(what, Invalidation::Camera | Invalidation::Scene);
-        let moving = moved && needs.temporal && view.settings().temporal;
-        Self { moved, moving, history: moving && view.history.is_some() && view.previous.is_some() }
+        let denoised = (moved || view.settings().denoise_stills) && denoises;
+        let history = denoised && view.history.is_some() && view.previous.is_some();
+        Self { moved, denoised, moving: moved && denoised, history }
     }
 }
 
@@ -169,10 +173,13 @@ fn frame_constants(
     let mut flags = 0;
     for (set, flag) in [
         (matrices.orthographic, FRAME_ORTHOGRAPHIC),
+        (plan.denoised, FRAME_DENOISED),
+        (plan.denoised && half_reflections(settings), FRAME_HALF_REFLECTIONS),
         (plan.moving, FRAME_MOVING),
         (plan.history, FRAME_HISTORY),
         (settings.opaque_glass_shadows, FRAME_OPAQUE_GLASS),
         (path, FRAME_PATHS_BEND),
+        (!plan.moved, FRAME_STEADY),
     ] {
         flags |= if set { flag } else { 0 };
     }
@@ -212,6 +219,11 @@ fn frame_constants(
         selection_count: view.selection.len() as u32 * 32,
         pad0: 0,
     })
+}
+
+/// One pixel of each 2 x 2 traces reflected light in frames that are denoised.
+fn half_reflections(settings: &ViewSettings) -> bool {
+    settings.reflection_rate == ReflectionRate::Half && settings.pipeline != Pipeline::Path
 }
 
 /// Stages the bit set of the outlined instances; 0 when nothing is selected.

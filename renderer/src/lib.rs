@@ -25,12 +25,12 @@ pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
 pub use inventory::{EnvironmentEntry, InstanceEntry, Inventory, Layout, MaterialEntry, MeshEntry, Place};
 pub use measure::{
-    AccelBench, AccelStatistics, BareStructure, BlasTimes, DeviceProfile, LeftOut, ProfileInForce,
-    Statistics, TlasTimes, TlasWork,
+    AccelBench, AccelStatistics, BareStructure, BlasTimes, DeviceProfile, LeftOut, PrimaryTimes,
+    ProfileInForce, Statistics, TlasTimes, TlasWork,
 };
 pub use needs::{Needs, SceneSummary, SurfaceSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
 pub use sampling::Sampling;
-pub use settings::{NeedsMode, Pipeline, Sampler, Show, ToneMap, ViewSettings};
+pub use settings::{NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Show, ToneMap, ViewSettings};
 pub use tables::sheen_albedo_table;
 pub use view::{View, ViewId};

@@ -7,7 +7,7 @@ use caustica_gpu::Specialization;
 
 use crate::delta::{Material, MaterialId, ShadingMode};
 use crate::measure::LeftOut;
-use crate::settings::{NeedsMode, Pipeline, Show, ViewSettings};
+use crate::settings::{NeedsMode, Pipeline, Primary, ReflectionRate, Show, ViewSettings};
 use crate::tables::{emits, has_alpha, is_opaque, transmits};
 
 /// What a scene holds, as far as it decides what is needed.
@@ -181,8 +181,10 @@ pub struct Needs {
     pub alpha: bool,
     /// Shadow rays: false in the raster pipeline.
     pub shadow_rays: bool,
-    /// The temporal pass.
+    /// Light is denoised over time while something moves.
     pub temporal: bool,
+    /// And over space.
+    pub spatial: bool,
     /// Motion vectors.
     pub motion: bool,
     /// Spheres and boxes.
@@ -199,7 +201,7 @@ pub struct Needs {
 }
 
 impl Needs {
-    /// Decides for a scene and the settings of a view.
+    /// Decides for a scene and the settings of a view, whose [`Primary::Auto`] counts as raster.
     pub fn of(scene: &SceneSummary, settings: &ViewSettings) -> Self {
         let surfaces = &scene.surfaces;
         let rays = settings.pipeline != Pipeline::Raster;
@@ -211,7 +213,9 @@ impl Needs {
             || scene.lights > settings.light_samples
             || scene.emissive_triangles > 0
             || scene.environment
-            || surfaces.alpha;
+            || surfaces.alpha
+            || (paths && scene.lights > 0);
+        let temporal = settings.temporal && rays;
         Self {
             lights: all || scene.lights > 0,
             emissive_lights: all || scene.emissive_triangles > 0,
@@ -226,10 +230,13 @@ impl Needs {
             any_hit: rays && (all || surfaces.any_hit),
             alpha: all || surfaces.alpha,
             shadow_rays: rays,
-            temporal: settings.temporal && rays && !paths && (all || noisy),
-            motion: all || settings.show == Show::Motion || (settings.temporal && rays && !paths && noisy),
+            temporal: temporal && (all || noisy),
+            spatial: temporal && settings.spatial && (all || noisy),
+            motion: all || settings.show == Show::Motion || (temporal && noisy),
             shapes: all || scene.shapes,
-            primary_rays: paths || settings.pipeline == Pipeline::Raytraced || (rays && scene.shapes),
+            primary_rays: paths
+                || settings.pipeline == Pipeline::Raytraced
+                || (rays && (scene.shapes || settings.primary == Primary::Rays)),
             paths,
             // Not with `all` alone: reading the textures of lobes takes lavapipe a minute to compile, in every general variant.
             lobes: surfaces.lobes,
@@ -245,6 +252,11 @@ impl Needs {
     /// Whether the shading pass traces rays of its own.
     pub fn secondary_rays(&self) -> bool {
         self.shadow_rays && (self.reflection || self.refraction)
+    }
+
+    /// Whether reflected light is denoised, and so can be traced by some pixels for others.
+    fn halves_reflections(&self) -> bool {
+        self.temporal && self.secondary_rays() && !self.paths
     }
 
     /// Constants of `shaders/shared/needs.glsl`, in its order.
@@ -264,6 +276,7 @@ impl Needs {
             self.shapes,
             self.lobes,
             self.ray_depth,
+            self.temporal,
         ];
         Specialization {
             values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),
@@ -283,7 +296,16 @@ impl Needs {
                 nothing
             }
         };
-        let list: [(bool, &str, &str); 16] = [
+        let why_not_denoised = |switched_off: &'static str| {
+            if !rays {
+                no_rays
+            } else if settings.temporal && !self.temporal {
+                "every light is hard, so one ray gives the exact shadow"
+            } else {
+                switched_off
+            }
+        };
+        let list: [(bool, &str, &str); 18] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -302,6 +324,11 @@ impl Needs {
                 why_no_secondary("no surface is smooth enough to mirror"),
             ),
             (rays && self.refraction, "refraction rays", why_no_secondary("no surface lets light pass")),
+            (
+                settings.reflection_rate == ReflectionRate::Full || self.halves_reflections(),
+                "reflections at half the rate",
+                if self.paths { "a path carries all light" } else { "no reflected light is denoised" },
+            ),
             (self.emission, "emissive target", "no surface emits"),
             (self.motion, "motion vectors", "nothing is denoised over time"),
             (self.any_hit, "any-hit shaders", if rays { "every surface is opaque" } else { no_rays }),
@@ -309,20 +336,23 @@ impl Needs {
             (
                 settings.pipeline != Pipeline::Hybrid || !self.primary_rays,
                 "raster of primary surfaces",
-                "the scene holds spheres or boxes, which rays meet without drawing each",
+                match settings.primary {
+                    _ if self.shapes => {
+                        "the scene holds spheres or boxes, which rays meet without drawing each"
+                    }
+                    Primary::Auto => "rays find the first surfaces faster, by the profile of the device",
+                    _ => "rays find the first surfaces, by the settings",
+                },
             ),
+            (self.temporal, "temporal denoising", why_not_denoised("a still image accumulates its samples")),
             (
-                self.temporal,
-                "temporal denoising",
-                if !rays {
-                    no_rays
-                } else if self.paths {
-                    "paths are averaged, not filtered"
-                } else if settings.temporal {
-                    "every light is hard, so one ray gives the exact shadow"
+                self.spatial,
+                "spatial denoising",
+                why_not_denoised(if settings.temporal {
+                    "it is switched off"
                 } else {
                     "a still image accumulates its samples"
-                },
+                }),
             ),
         ];
         list.into_iter()
@@ -401,6 +431,18 @@ mod tests {
         assert_eq!(tally.summary(), summary(&[rough(), glass, smooth]).surfaces);
         ids.iter().for_each(|id| tally.set(*id, None));
         assert_eq!(tally.summary(), SurfaceSummary::default());
+    }
+
+    #[test]
+    fn rays_find_the_first_surfaces_where_they_are_asked_to() {
+        let rays = ViewSettings { primary: Primary::Rays, ..ViewSettings::default() };
+        let raster = ViewSettings { primary: Primary::Raster, ..ViewSettings::default() };
+        let (plain, shapes) = (summary(&[rough()]), SceneSummary { shapes: true, ..summary(&[rough()]) });
+        assert!(Needs::of(&plain, &rays).primary_rays && !Needs::of(&plain, &raster).primary_rays);
+        assert!(!Needs::of(&plain, &ViewSettings::default()).primary_rays);
+        assert!(Needs::of(&shapes, &raster).primary_rays);
+        let no_rays = ViewSettings { pipeline: Pipeline::Raster, ..rays };
+        assert!(!Needs::of(&plain, &no_rays).primary_rays);
     }
 
     #[test]

@@ -5,6 +5,7 @@ mod accumulate;
 mod blas_surface;
 mod deferred;
 mod deform;
+mod denoise;
 mod gbuffer;
 mod instance_descriptors;
 mod light_shadow;
@@ -27,6 +28,7 @@ pub(crate) use accumulate::Accumulate;
 pub(crate) use blas_surface::BlasSurface;
 pub(crate) use deferred::Deferred;
 pub(crate) use deform::Deform;
+pub(crate) use denoise::{Denoise, Moving};
 pub(crate) use gbuffer::GBuffer;
 pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
 pub(crate) use light_shadow::LightShadow;
@@ -211,7 +213,7 @@ impl ScenePasses {
 
 /// How light gets from the first surfaces to the camera.
 pub(crate) enum Radiance {
-    /// Direct light, denoised while something moves, then shading with its rays.
+    /// Direct light, then shading with its rays.
     Deferred(Box<Deferred>),
     /// One path a pixel.
     Path(Box<PathTrace>),
@@ -220,7 +222,10 @@ pub(crate) enum Radiance {
 impl Radiance {
     /// Whether frames are denoised while something moves.
     pub(crate) fn denoises(&self) -> bool {
-        matches!(self, Self::Deferred(deferred) if deferred.denoises())
+        match self {
+            Self::Deferred(deferred) => deferred.denoise.is_some(),
+            Self::Path(path) => path.denoise.is_some(),
+        }
     }
 }
 

@@ -18,7 +18,7 @@ use crate::measure::Statistics;
 use crate::needs::Needs;
 use crate::passes::{Builder, PassSet, ScenePasses};
 use crate::sampling::Sampling;
-use crate::settings::{Pipeline, ViewSettings};
+use crate::settings::{Pipeline, Primary, ViewSettings};
 use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
 use crate::summary::Summary;
 use crate::tables::{Changed, Tables};
@@ -31,6 +31,8 @@ pub struct RendererOptions {
     pub shaders: Option<PathBuf>,
     /// When acceleration structures are built, refitted and compacted.
     pub acceleration: AccelPolicy,
+    /// Rays find the first surfaces faster than the rasteriser does: what [`Primary::Auto`] means.
+    pub primary_rays_pay: bool,
 }
 
 /// What is seen through a pixel.
@@ -61,6 +63,7 @@ pub struct Renderer {
     library: ShaderLibrary,
     tables: Tables,
     accel: Accel,
+    primary_rays_pay: bool,
     scene_passes: ScenePasses,
     views: BTreeMap<ViewId, View>,
     next_view: u32,
@@ -88,6 +91,7 @@ impl Renderer {
             library,
             tables,
             accel: Accel::new(device, options.acceleration)?,
+            primary_rays_pay: options.primary_rays_pay,
             views: BTreeMap::new(),
             next_view: 0,
             passes: HashMap::new(),
@@ -212,7 +216,11 @@ impl Renderer {
     pub fn render(&mut self, recorder: &mut Recorder, id: ViewId) -> Result<()> {
         let view = self.view(id)?;
         let settings = view.settings().clone();
-        let needs = Needs::of(self.summary.scene(), &settings);
+        let primary = match settings.primary {
+            Primary::Auto if self.primary_rays_pay => Primary::Rays,
+            primary => primary,
+        };
+        let needs = Needs::of(self.summary.scene(), &ViewSettings { primary, ..settings.clone() });
         let key = (settings.pipeline, needs, view.sampling());
         self.prepare_passes(key, id, recorder.slot())?;
         if settings.multiple_scattering {
@@ -311,6 +319,17 @@ impl Renderer {
         let image = self.view(id)?.display_image().ok_or_else(nothing)?;
         let halves: Vec<u16> = words_of(&read_image(&self.device, frames, image)?);
         Ok(halves.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|i| half_to_float(p[i]))).collect())
+    }
+
+    /// Reads the radiance of the last frame of a view, denoised where that frame was. Waits for the device.
+    ///
+    /// # Errors
+    /// When the view was removed or has no frame yet, or the device fails.
+    pub fn read_frame(&mut self, frames: &mut Frames, id: ViewId) -> Result<Vec<[f32; 3]>> {
+        let nothing = || RendererError::Unknown { what: "frame of view", id: id.0.to_string() };
+        let (_, targets) = self.view(id)?.targets.as_ref().ok_or_else(nothing)?;
+        let floats: Vec<f32> = words_of(&read_image(&self.device, frames, &targets.shaded)?);
+        Ok(floats.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect())
     }
 
     /// What is seen through a pixel in the last frame. Waits for the device.

@@ -68,6 +68,44 @@ impl ToneMap {
     }
 }
 
+/// How `hybrid` finds the first surfaces. The picture is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Primary {
+    /// As is faster on the device, by its profile.
+    #[default]
+    Auto,
+    /// By the rasteriser; by rays where the scene holds spheres or boxes.
+    Raster,
+    /// By rays.
+    Rays,
+}
+
+impl Primary {
+    /// Every way, in the order of menus.
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Raster, Self::Rays];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Raster => "raster",
+            Self::Rays => "rays",
+        }
+    }
+}
+
+/// How many pixels trace reflected and refracted light in frames of `hybrid` and `raytraced` that are denoised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ReflectionRate {
+    /// Each.
+    #[default]
+    Full,
+    /// One of each 2 x 2, in turns.
+    Half,
+}
+
 /// Where the random numbers of a picture come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -125,6 +163,8 @@ pub struct ViewSettings {
     pub show_light: Option<LightId>,
     /// Special or general variants.
     pub needs: NeedsMode,
+    /// How `hybrid` finds the first surfaces.
+    pub primary: Primary,
     /// Exposure in stops; 0 leaves radiance 1 at 1.
     pub exposure_ev: f32,
     /// Tone map.
@@ -145,10 +185,16 @@ pub struct ViewSettings {
     pub multiple_scattering: bool,
     /// Surfaces up to this roughness trace their specular lobe; rougher ones see the environment only.
     pub reflection_roughness_max: f32,
+    /// How many pixels trace reflected light while it is denoised.
+    pub reflection_rate: ReflectionRate,
     /// Shadow rays stop at glass instead of passing it tinted and unbent.
     pub opaque_glass_shadows: bool,
     /// Denoise over time while things move. Off for headless stills, which accumulate anyway.
     pub temporal: bool,
+    /// Denoise over space too; nothing without `temporal`.
+    pub spatial: bool,
+    /// Denoise when nothing moves, too: the mean is that of denoised frames, and biased.
+    pub denoise_stills: bool,
     /// Longest history while moving, frames.
     pub temporal_max_history: f32,
     /// Jitter primary samples inside the pixel; off gives hard, reproducible edges for tests.
@@ -162,6 +208,7 @@ impl Default for ViewSettings {
             show: Show::Image,
             show_light: None,
             needs: NeedsMode::Auto,
+            primary: Primary::Auto,
             exposure_ev: 0.0,
             tone_map: ToneMap::Neutral,
             sampler: Sampler::Sobol,
@@ -172,8 +219,11 @@ impl Default for ViewSettings {
             path_depth: None,
             multiple_scattering: false,
             reflection_roughness_max: 0.5,
+            reflection_rate: ReflectionRate::Full,
             opaque_glass_shadows: false,
             temporal: true,
+            spatial: true,
+            denoise_stills: false,
             temporal_max_history: 24.0,
             jitter: true,
         }

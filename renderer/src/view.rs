@@ -11,7 +11,7 @@ use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse
 
 pub(crate) use bands::Bands;
 pub(crate) use camera::CameraMatrices;
-pub(crate) use targets::Targets;
+pub(crate) use targets::{History, Targets};
 
 use crate::accumulation::Accumulation;
 use crate::delta::{Camera, Invalidation, LightId};

@@ -7,10 +7,13 @@
 
 // Frame.flags
 const uint FRAME_ORTHOGRAPHIC = 1u;
-const uint FRAME_MOVING = 2u;           // show the denoised signals of this frame, not the accumulated mean
+const uint FRAME_MOVING = 2u;           // show this frame, not the accumulated mean
 const uint FRAME_HISTORY = 4u;          // the temporal history belongs to the last frame and may be reprojected
 const uint FRAME_OPAQUE_GLASS = 8u;     // shadow rays stop at refractive surfaces (setting)
 const uint FRAME_PATHS_BEND = 16u;      // shadow rays stop where paths bend or spread, which find the light by themselves (path tracer)
+const uint FRAME_STEADY = 32u;          // nothing has moved since the last frame: the history is exact, and not clamped
+const uint FRAME_DENOISED = 64u;        // light is kept apart, to be denoised
+const uint FRAME_HALF_REFLECTIONS = 128u; // one pixel of each 2x2 traces its reflected light
 
 // Frame.tone_map, in the order of renderer::ToneMap.
 const uint TONE_MAP_LINEAR = 0u;

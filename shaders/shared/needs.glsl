@@ -17,5 +17,6 @@ layout(constant_id = 10) const bool NEEDS_MOTION = true;             // motion v
 layout(constant_id = 11) const bool NEEDS_SHAPES = true;             // some mesh holds spheres or boxes instead of triangles
 layout(constant_id = 12) const bool NEEDS_LOBES = true;              // some material has lobes beside metallic-roughness
 layout(constant_id = 13) const bool NEEDS_RAY_DEPTH = false;         // the ray depth is shown
+layout(constant_id = 14) const bool NEEDS_DENOISING = true;          // light may be denoised over time
 
 #endif

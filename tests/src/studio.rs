@@ -54,7 +54,8 @@ impl Studio {
 
     fn make(extent: [u32; 2], settings: ViewSettings, window: bool, acceleration: AccelPolicy) -> Self {
         let mut session = session();
-        let options = RendererOptions { shaders: shaders_under_test(), acceleration };
+        let options =
+            RendererOptions { shaders: shaders_under_test(), acceleration, ..RendererOptions::default() };
         let mut renderer = Renderer::new(&session.device, &mut session.frames, &options).expect("a renderer");
         let view = renderer.create_view(extent, settings, window).expect("a view");
         Self { renderer, view, session }
@@ -150,6 +151,14 @@ impl Studio {
     /// When the device fails.
     pub fn read(&mut self) -> Accumulated {
         self.renderer.read_back(&mut self.session.frames, self.view).expect("a read-back")
+    }
+
+    /// Reads the radiance of the last frame, denoised where that frame was.
+    ///
+    /// # Panics
+    /// When the device fails.
+    pub fn read_frame(&mut self) -> Vec<[f32; 3]> {
+        self.renderer.read_frame(&mut self.session.frames, self.view).expect("a read-back")
     }
 
     /// Reads the tone-mapped, linear image.

@@ -232,6 +232,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         alpha: false,
         shadow_rays: false,
         temporal: false,
+        spatial: false,
         motion: false,
         shapes: false,
         primary_rays: false,
@@ -254,6 +255,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         ("SHAPES", Needs { shapes: true, ..nothing }),
         ("LOBES", Needs { lobes: true, ..nothing }),
         ("RAY_DEPTH", Needs { ray_depth: true, ..nothing }),
+        ("DENOISING", Needs { temporal: true, ..nothing }),
     ];
     let text = shader_text("shared/needs.glsl");
     let count = text.matches("constant_id").count();

@@ -21,7 +21,7 @@ use super::{DeviceArgs, EXIT_DEVICE};
 #[derive(Args, Debug)]
 pub(super) struct DevicesArgs {
     /// Measure the device that is chosen, or the one of `--device`, and keep the figures: from them follows what is
-    /// refitted, compacted and built at once
+    /// refitted, compacted and built at once, and how the first surfaces are found
     #[arg(long)]
     measure: bool,
     /// Print one JSON object
@@ -86,6 +86,7 @@ fn profile_to_json(profile: &DeviceProfile, file: Option<&Path>) -> serde_json::
         "refit_pays": profile.refit_pays(),
         "refits_tlas": profile.refits_tlas(),
         "compaction_pays": profile.compaction_pays(),
+        "primary_rays_pay": profile.primary_rays_pay(),
         "triangles_built_in_1_ms": profile.triangles_in(1.0),
     })
 }
@@ -115,6 +116,14 @@ fn print_profile(profile: &DeviceProfile) {
         answer(profile.compaction_pays()),
         profile.compacted_share * 100.0
     );
+    if let Some(primary) = profile.primary {
+        say!(
+            "   rays find the first surfaces faster: {} ({:.2} ms against {:.2})",
+            answer(profile.primary_rays_pay()),
+            primary.rays_ms,
+            primary.raster_ms
+        );
+    }
 }
 
 fn kind_name(kind: DeviceKind) -> &'static str {

@@ -1,17 +1,21 @@
 //! `caustica render`: a project or model to an image file.
 
+mod args;
+
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
+use caustica_renderer::ViewSettings;
 use caustica_renderer::delta::LightId;
-use caustica_renderer::{NeedsMode, Pipeline, Sampler, Show, ToneMap, ViewSettings};
 use caustica_scene::Edit;
-use clap::{ArgGroup, Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
+
+pub(super) use args::RenderArgs;
+use args::settings_of;
 
 use super::DeviceArgs;
 use super::output::{self, Kind, Metadata};
@@ -21,168 +25,6 @@ use crate::session::{Session, SessionOptions, ViewCamera, environment_argument, 
 const TIMED_FRAMES: usize = 4096;
 /// Samples when nothing else is said.
 const DEFAULT_SAMPLES: u64 = 64;
-
-/// Arguments of `caustica render`.
-#[derive(Args, Debug)]
-#[command(group(ArgGroup::new("until").args(["samples", "time", "target_error"])))]
-pub(super) struct RenderArgs {
-    /// A project, .gltf, .glb or .obj
-    file: PathBuf,
-    /// Where the image goes: .png (tone mapped) or .exr (radiance)
-    #[arg(short, long, value_name = "OUT", value_parser = parse_output)]
-    output: PathBuf,
-    /// How the image is made
-    #[arg(long, value_enum)]
-    pipeline: Option<PipelineArg>,
-    /// Size in pixels
-    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1280x720")]
-    size: [u32; 2],
-    /// Samples a pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    samples: Option<u64>,
-    /// Seconds to render
-    #[arg(long, value_name = "SECONDS", value_parser = parse_positive)]
-    time: Option<f64>,
-    /// Stop at this noise: sqrt(relMSE) estimated from two independent streams, 0.01 is 1 %
-    #[arg(long, value_name = "X", value_parser = parse_positive)]
-    target_error: Option<f64>,
-    /// Show the scene at this time of its animation; past the end of a clip it begins again. Without it: at rest
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
-    at: Option<f64>,
-    /// Name of the camera
-    #[arg(long)]
-    camera: Option<String>,
-    /// An environment map (.hdr, .exr), or a constant radiance R,G,B
-    #[arg(long, value_name = "FILE|R,G,B")]
-    environment: Option<String>,
-    /// Where random numbers come from. A Hammersley set is made for half of --samples, as there are two streams; without
-    /// --samples, for 256
-    #[arg(long, value_enum)]
-    sampler: Option<SamplerArg>,
-    /// Seed of all random numbers
-    #[arg(long)]
-    seed: Option<u32>,
-    /// Reflections and refractions after the first surface; bounces in `path`, where the default is no limit
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1024))]
-    max_depth: Option<u32>,
-    /// In `path`, reflect the light too that rough surfaces scatter more than once (off: glTF to the letter)
-    #[arg(long)]
-    multiple_scattering: bool,
-    /// Shadow rays a light and pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
-    shadow_rays: Option<u32>,
-    /// First sample of a set that is rendered in parts
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 47))]
-    sample_offset: u64,
-    /// Leave out what the scene does not need, or build everything
-    #[arg(long, value_enum)]
-    needs: Option<NeedsArg>,
-    /// Exposure in stops
-    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = parse_finite)]
-    exposure: Option<f32>,
-    /// Tone map of a PNG
-    #[arg(long, value_enum)]
-    tone_map: Option<ToneMapArg>,
-    /// What a PNG shows: the image, or a step on the way such as base_color, normal, depth
-    #[arg(long, value_name = "VIEW", value_parser = parse_show, long_help = show_help())]
-    show: Option<Show>,
-    /// The light of `--show shadow`: its name, or its number from 1; without it the first that shines
-    #[arg(long, value_name = "NAME|N")]
-    show_light: Option<String>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    json: bool,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum PipelineArg {
-    Raster,
-    Hybrid,
-    Raytraced,
-    Path,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum NeedsArg {
-    Auto,
-    All,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum ToneMapArg {
-    Linear,
-    Aces,
-    Agx,
-    Neutral,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum SamplerArg {
-    /// Owen-scrambled Sobol points
-    Sobol,
-    /// Halton points, scrambled a pixel
-    Halton,
-    /// Hammersley sets: even when complete, like independent numbers before
-    Hammersley,
-    /// Independent numbers (hashed PCG)
-    Independent,
-    /// Sobol points with offsets that make errors of neighbouring pixels cancel
-    BlueNoise,
-}
-
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
-    let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));
-    match [side(width)?, side(height)?] {
-        [0, _] | [_, 0] => Err(String::from("a side of 0 pixels")),
-        size => Ok(size),
-    }
-}
-
-fn parse_positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
-        _ => Err(String::from("expected a number above 0")),
-    }
-}
-
-fn parse_finite(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(String::from("expected a number")),
-    }
-}
-
-fn parse_seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
-        _ => Err(String::from("expected a number of seconds, 0 or more")),
-    }
-}
-
-fn parse_output(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    output::kind_of(&path).map(|_| path).map_err(|error| error.to_string())
-}
-
-fn parse_show(text: &str) -> Result<Show, String> {
-    serde_json::from_value(json!(text)).map_err(|_| {
-        let names: Vec<String> = show_names().map(|(_, name)| name).collect();
-        format!("one of {}", names.join(", "))
-    })
-}
-
-/// Every view with its name on the command line.
-fn show_names() -> impl Iterator<Item = (Show, String)> {
-    let name = |show| serde_json::to_value(show).ok()?.as_str().map(str::to_owned);
-    Show::ALL.into_iter().filter_map(move |(show, _)| Some((show, name(show)?)))
-}
-
-fn show_help() -> String {
-    let lines: Vec<String> =
-        show_names().map(|(show, name)| format!("  {name:16} {}", show.meaning())).collect();
-    format!("What a PNG shows: the image, or a step on the way:\n{}", lines.join("\n"))
-}
 
 /// The light that `--show-light` names.
 fn light_of(session: &Session, name: &str) -> anyhow::Result<LightId> {
@@ -243,7 +85,7 @@ pub(super) fn run(
     let run = accumulate(&mut session, args, &progress)?;
     progress.finish_and_clear();
     let metadata = Metadata {
-        samples: session.samples(),
+        samples: run.samples,
         sample_offset: args.sample_offset,
         seconds: run.seconds,
         device: format!("{}, {}", device.name(), device.driver()),
@@ -251,18 +93,22 @@ pub(super) fn run(
         sampler: session.settings().sampler.name(),
         seed: session.settings().seed,
     };
+    // What the scene has no need of was left out.
+    let left_out = &session.statistics().left_out;
+    let denoised = args.denoises() && left_out.iter().all(|left| left.what != "temporal denoising");
     let accumulated = session.read_back()?;
-    let noise = noise_of(&accumulated, metadata.samples);
+    // Frames that share their past do not tell how far they are from the truth.
+    let noise = if denoised { None } else { noise_of(&accumulated, metadata.samples) };
     match kind {
         Kind::Exr => output::write_exr(&args.output, args.size, &accumulated.mean, &metadata)?,
         Kind::Png => output::write_png(&args.output, args.size, &session.read_display()?)?,
     }
     report_validation(&device)?;
     if args.json {
-        say!("{}", summary(args, &session, &metadata, &run, noise, loaded_in));
+        say!("{}", summary(args, &session, &metadata, &run, noise, denoised, loaded_in));
     } else {
         say!(
-            "{}: {}x{}, {} samples in {:.2} s ({}), noise {}, {}",
+            "{}: {}x{}, {} samples in {:.2} s ({}), noise {}{}, {}",
             args.output.display(),
             args.size[0],
             args.size[1],
@@ -270,6 +116,7 @@ pub(super) fn run(
             metadata.seconds,
             metadata.pipeline,
             noise.map_or_else(|| String::from("unknown"), |noise| format!("{:.2} %", noise * 100.0)),
+            if denoised { ", denoised: bias unknown" } else { "" },
             metadata.device
         );
     }
@@ -287,46 +134,10 @@ pub(super) fn report_validation(device: &caustica_renderer::gpu::Device) -> anyh
     }
 }
 
-fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
-    ViewSettings {
-        pipeline: args.pipeline.map_or(of_project.pipeline, |pipeline| match pipeline {
-            PipelineArg::Raster => Pipeline::Raster,
-            PipelineArg::Hybrid => Pipeline::Hybrid,
-            PipelineArg::Raytraced => Pipeline::Raytraced,
-            PipelineArg::Path => Pipeline::Path,
-        }),
-        needs: args.needs.map_or(of_project.needs, |needs| match needs {
-            NeedsArg::Auto => NeedsMode::Auto,
-            NeedsArg::All => NeedsMode::All,
-        }),
-        tone_map: args.tone_map.map_or(of_project.tone_map, |tone_map| match tone_map {
-            ToneMapArg::Linear => ToneMap::Linear,
-            ToneMapArg::Aces => ToneMap::Aces,
-            ToneMapArg::Agx => ToneMap::Agx,
-            ToneMapArg::Neutral => ToneMap::Neutral,
-        }),
-        show: args.show.unwrap_or_default(),
-        exposure_ev: args.exposure.unwrap_or(of_project.exposure_ev),
-        sampler: args.sampler.map_or(of_project.sampler, |sampler| match sampler {
-            SamplerArg::Sobol => Sampler::Sobol,
-            SamplerArg::Halton => Sampler::Halton,
-            SamplerArg::Hammersley => Sampler::Hammersley,
-            SamplerArg::Independent => Sampler::Independent,
-            SamplerArg::BlueNoise => Sampler::BlueNoise,
-        }),
-        seed: args.seed.unwrap_or(of_project.seed),
-        max_depth: args.max_depth.unwrap_or(of_project.max_depth),
-        path_depth: args.max_depth.or(of_project.path_depth),
-        multiple_scattering: args.multiple_scattering || of_project.multiple_scattering,
-        shadow_rays: args.shadow_rays.unwrap_or(of_project.shadow_rays),
-        temporal: false,
-        ..of_project
-    }
-}
-
 /// How a run went.
 struct Run {
     seconds: f64,
+    samples: u64,
     /// Milliseconds of each frame, by pass.
     frames: Vec<Vec<(String, f64)>>,
 }
@@ -346,15 +157,16 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     let start = Instant::now();
     let mut frames = Vec::new();
     let in_time = |samples: u64| samples == 0 || limit.is_none_or(|limit| start.elapsed() < limit);
-    while session.samples() < samples && in_time(session.samples()) {
+    let mut done = 0;
+    while done < samples && in_time(done) {
         let recorder = session.begin_frame(args.size)?;
         session.submit(recorder, None)?;
         let times = &session.statistics().passes;
         if frames.len() < TIMED_FRAMES && !times.is_empty() {
             frames.push(times.clone());
         }
-        progress.set_position(session.samples());
-        let done = session.samples();
+        done = session.samples();
+        progress.set_position(done);
         // Looked at a few times only: reading back waits for the device.
         if let Some(target) = args.target_error
             && done >= 16
@@ -366,7 +178,7 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     }
     session.finish()?;
     frames.push(session.statistics().passes.clone());
-    Ok(Run { seconds: start.elapsed().as_secs_f64(), frames })
+    Ok(Run { samples: done, seconds: start.elapsed().as_secs_f64(), frames })
 }
 
 /// sqrt(relMSE) of the mean by the two streams: their half difference has the variance of the mean. `None` with one
@@ -391,6 +203,7 @@ fn summary(
     metadata: &Metadata,
     run: &Run,
     noise: Option<f64>,
+    denoised: bool,
     loaded_in: Duration,
 ) -> serde_json::Value {
     let statistics = session.statistics();
@@ -414,6 +227,7 @@ fn summary(
         "load_seconds": loaded_in.as_secs_f64(),
         "ms_per_pass": passes,
         "noise": noise,
+        "denoised": denoised,
         "acceleration_structures": statistics.acceleration,
         "memory_bytes": memory,
         "non_finite_samples": statistics.non_finite,

@@ -1,7 +1,9 @@
 //! Settings of the picture: environment, pipeline, exposure, sampling. Enters and leaves: the view's settings.
 
 use caustica_renderer::delta::LightId;
-use caustica_renderer::{NeedsMode, Pipeline, Sampler, Sampling, Show, ToneMap, ViewSettings};
+use caustica_renderer::{
+    NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Sampling, Show, ToneMap, ViewSettings,
+};
 use egui::{DragValue, Slider, Ui};
 
 use super::{Cx, field, section};
@@ -86,6 +88,18 @@ fn pipeline_tip(pipeline: Pipeline) -> &'static str {
 
 fn picture(session: &Session, ui: &mut Ui, settings: &mut ViewSettings) {
     field(ui, "Pipeline", "How the picture is made", |ui| pipeline_menu(ui, &mut settings.pipeline));
+    if settings.pipeline == Pipeline::Hybrid {
+        field(ui, "First surfaces", "How they are found; automatic is what is faster on this device", |ui| {
+            egui::ComboBox::from_id_salt("primary").selected_text(primary_name(settings.primary)).show_ui(
+                ui,
+                |ui| {
+                    for choice in Primary::ALL {
+                        ui.selectable_value(&mut settings.primary, choice, primary_name(choice));
+                    }
+                },
+            );
+        });
+    }
     field(ui, "Show", "The finished picture or a step on the way", |ui| show_menu(ui, &mut settings.show));
     if settings.show == Show::Shadow {
         field(ui, "Light", "The light whose shadow is shown", |ui| {
@@ -111,6 +125,14 @@ fn picture(session: &Session, ui: &mut Ui, settings: &mut ViewSettings) {
             },
         );
     });
+}
+
+fn primary_name(primary: Primary) -> &'static str {
+    match primary {
+        Primary::Auto => "Automatic",
+        Primary::Raster => "Raster",
+        Primary::Rays => "Rays",
+    }
 }
 
 fn tone_name(tone_map: ToneMap) -> &'static str {
@@ -219,7 +241,18 @@ fn path_depth(ui: &mut Ui, settings: &mut ViewSettings) {
 fn moving(cx: &mut Cx<'_>, ui: &mut Ui, settings: &mut ViewSettings) {
     field(ui, "Denoise", "Use earlier frames while something moves", |ui| {
         ui.checkbox(&mut settings.temporal, "over time");
+        ui.add_enabled(settings.temporal, egui::Checkbox::new(&mut settings.spatial, "over space"));
     });
+    field(
+        ui,
+        "Reflections",
+        "Trace them in one pixel of four while they are denoised: faster, less sharp",
+        |ui| {
+            let mut half = settings.reflection_rate == ReflectionRate::Half;
+            ui.add_enabled(settings.temporal, egui::Checkbox::new(&mut half, "at half the rate"));
+            settings.reflection_rate = if half { ReflectionRate::Half } else { ReflectionRate::Full };
+        },
+    );
     let config = &mut cx.state.config;
     field(
         ui,

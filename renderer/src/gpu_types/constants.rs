@@ -87,6 +87,12 @@ pub const FRAME_HISTORY: u32 = 4;
 pub const FRAME_OPAQUE_GLASS: u32 = 8;
 /// [`super::Frame::flags`]: shadow rays stop where paths bend or spread, which find the light by themselves.
 pub const FRAME_PATHS_BEND: u32 = 16;
+/// [`super::Frame::flags`]: nothing has moved since the last frame, so its history is exact and not clamped.
+pub const FRAME_STEADY: u32 = 32;
+/// [`super::Frame::flags`]: light is kept apart, to be denoised.
+pub const FRAME_DENOISED: u32 = 64;
+/// [`super::Frame::flags`]: one pixel of each 2 x 2 traces its reflected light.
+pub const FRAME_HALF_REFLECTIONS: u32 = 128;
 
 /// [`super::Frame::tone_map`]: clamp.
 pub const TONE_MAP_LINEAR: u32 = 0;

@@ -9,6 +9,7 @@ use caustica_gpu::{Device, DeviceKind, Frames};
 use serde::{Deserialize, Serialize};
 
 use super::accel_bench::AccelBench;
+use super::primary_bench;
 use crate::error::{RendererError, Result};
 
 /// Triangles of the BLAS that is measured.
@@ -21,6 +22,10 @@ const REFIT_SHARE: f64 = 0.7;
 const TLAS_REFIT_SHARE: f64 = 1.2;
 /// A compaction pays when it leaves less than this share of the bytes.
 const COMPACTED_SHARE: f64 = 0.95;
+/// First surfaces by raster and by rays that are usual: of the gallery at 1280 x 720 on lavapipe and on an H100
+/// (`tests/bench/results/2026-11-25-lavapipe-gallery.md`, `2026-11-24-h100-gallery.md`).
+const PRIMARY_CPU_MS: [f64; 2] = [74.0, 247.0];
+const PRIMARY_MS: [f64; 2] = [0.977, 0.366];
 /// Version of the file.
 const FORMAT: u32 = 1;
 /// Longest part of a file name, characters.
@@ -46,6 +51,18 @@ pub struct DeviceProfile {
     pub tlas_refit_ms: f64,
     /// Bytes of a BLAS after compaction, by those before.
     pub compacted_share: f64,
+    /// The first surfaces of the measured scene; not in files of older versions, which then have those usual for the device.
+    #[serde(default)]
+    pub primary: Option<PrimaryTimes>,
+}
+
+/// The first surfaces of 131,072 triangles in 64 instances at 640 x 360, with normals and materials.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PrimaryTimes {
+    /// By the rasteriser.
+    pub raster_ms: f64,
+    /// By rays.
+    pub rays_ms: f64,
 }
 
 /// The profile that holds for a device, and the file it is from; without one it is the default of its kind.
@@ -72,6 +89,9 @@ impl DeviceProfile {
         let blas = bench.triangles(TRIANGLES)?;
         progress("100,000 instances");
         let tlas = bench.instances(INSTANCES)?;
+        drop(bench);
+        progress("first surfaces by raster and by rays");
+        let primary = primary_bench::measure(device, frames)?;
         let profile = Self {
             format: FORMAT,
             device: device.name().to_owned(),
@@ -82,6 +102,7 @@ impl DeviceProfile {
             tlas_build_ms: tlas.build_ms,
             tlas_refit_ms: tlas.refit_ms,
             compacted_share: blas.compacted_bytes as f64 / blas.bytes.max(1) as f64,
+            primary: Some(primary),
         };
         if profile.is_plausible() {
             Ok(profile)
@@ -103,10 +124,12 @@ impl DeviceProfile {
                 DeviceKind::Cpu => [4.7, 4.7, 4.7, 9.0, 9.0, 1.0],
                 _ => [0.49, 0.30, 0.09, 0.41, 0.05, 0.86],
             };
+        let [raster_ms, rays_ms] = if kind == DeviceKind::Cpu { PRIMARY_CPU_MS } else { PRIMARY_MS };
         Self {
             format: FORMAT,
             device: name.to_owned(),
             driver: driver.to_owned(),
+            primary: Some(PrimaryTimes { raster_ms, rays_ms }),
             blas_build_ms,
             blas_fast_build_ms,
             blas_refit_ms,
@@ -132,7 +155,10 @@ impl DeviceProfile {
         let default = || Self::default_of(name, driver, kind);
         let Some(file) = file else { return ProfileInForce { profile: default(), file: None } };
         match read(&file, name, driver) {
-            Ok(profile) => ProfileInForce { profile, file: Some(file) },
+            Ok(profile) => {
+                let primary = profile.primary.or_else(|| default().primary);
+                ProfileInForce { profile: Self { primary, ..profile }, file: Some(file) }
+            }
             Err(reason) => {
                 tracing::warn!(
                     "{}: {reason}; what is usual for such a device is taken instead \
@@ -192,6 +218,11 @@ impl DeviceProfile {
         self.compacted_share < COMPACTED_SHARE
     }
 
+    /// Whether rays find the first surfaces faster than the rasteriser.
+    pub fn primary_rays_pay(&self) -> bool {
+        self.primary.is_some_and(|primary| primary.rays_ms < primary.raster_ms)
+    }
+
     /// How many triangles are first built in `ms` milliseconds.
     pub fn triangles_in(&self, ms: f64) -> u64 {
         // The conversion saturates; times are above 0.
@@ -207,8 +238,9 @@ impl DeviceProfile {
             self.tlas_refit_ms,
             self.compacted_share,
         ]
-        .iter()
-        .all(|figure| figure.is_finite() && *figure > 0.0)
+        .into_iter()
+        .chain(self.primary.iter().flat_map(|primary| [primary.raster_ms, primary.rays_ms]))
+        .all(|figure| figure.is_finite() && figure > 0.0)
     }
 }
 
@@ -287,9 +319,12 @@ mod tests {
     fn a_processor_refits_and_compacts_nothing_a_card_does_both() {
         let processor = DeviceProfile::default_of("llvmpipe", "Mesa", DeviceKind::Cpu);
         assert!(!processor.refit_pays() && processor.refits_tlas() && !processor.compaction_pays());
+        assert!(!processor.primary_rays_pay());
         for kind in [DeviceKind::Discrete, DeviceKind::Integrated, DeviceKind::Virtual, DeviceKind::Other] {
             let card = DeviceProfile::default_of(NAME, DRIVER, kind);
-            assert!(card.refit_pays() && card.refits_tlas() && card.compaction_pays());
+            assert!(
+                card.refit_pays() && card.refits_tlas() && card.compaction_pays() && card.primary_rays_pay()
+            );
         }
     }
 
@@ -329,6 +364,14 @@ mod tests {
         assert_eq!(folder.in_force(), ProfileInForce { profile: measured(), file: Some(file) });
         let names = std::fs::read_dir(&folder.0).expect("the folder").count();
         assert_eq!(names, 1, "no temporary file is left");
+    }
+
+    #[test]
+    fn a_file_of_an_older_version_has_the_usual_first_surfaces() {
+        let folder = Folder::new("profile-older");
+        let older = DeviceProfile { primary: None, ..measured() };
+        let file = older.store_in(&folder.0).expect("the temporary folder can be written");
+        assert_eq!(folder.in_force(), ProfileInForce { profile: measured(), file: Some(file) });
     }
 
     #[test]

@@ -1,52 +1,55 @@
-//! Light in three passes, for all pipelines but `path`: `shadow`, `temporal`, `shading`. Enters: the G-buffer. Leaves:
-//! `shaded`.
+//! Light of all pipelines but `path`: `shadow`, `shading`, and while something moves `denoise`. Enters: the G-buffer.
+//! Leaves: `shaded`.
 
-use caustica_gpu::{Buffer, Recorder};
+use caustica_gpu::Recorder;
 
-use super::{Builder, Scope, Shading, Shadow, Temporal};
+use super::denoise::Moving;
+use super::{Builder, Denoise, Scope, Shading, Shadow};
 use crate::error::Result;
 use crate::view::Targets;
 
 /// The passes.
 pub(crate) struct Deferred {
     shadow: Option<Shadow>,
-    temporal: Option<Temporal>,
     shading: Shading,
+    pub(super) denoise: Option<Denoise>,
 }
 
 impl Deferred {
     pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
-        let needs = builder.needs;
         Ok(Self {
-            shadow: needs.direct_light().then(|| Shadow::new(builder)).transpose()?,
-            temporal: (needs.temporal && needs.direct_light()).then(|| Temporal::new(builder)).transpose()?,
+            shadow: builder.needs.direct_light().then(|| Shadow::new(builder)).transpose()?,
             shading: Shading::new(builder)?,
+            denoise: Denoise::new(builder)?,
         })
     }
 
-    pub(crate) fn denoises(&self) -> bool {
-        self.temporal.is_some()
-    }
-
-    /// Fills `shaded`. `moving`: which history is filled, and the counter of dropped samples, while something moves.
+    /// Fills `shaded`; denoised when `moving`.
     pub(crate) fn record(
         &self,
         recorder: &mut Recorder,
         scope: &Scope<'_>,
         targets: &Targets,
         parity: usize,
-        moving: Option<(usize, &Buffer)>,
+        moving: Option<Moving<'_>>,
     ) -> Result<()> {
         if let Some(shadow) = &self.shadow {
             shadow.record(recorder, scope, targets, parity)?;
         }
-        if let (Some(temporal), Some((filled, counters))) = (&self.temporal, moving) {
-            temporal.record(recorder, scope, targets, parity, filled, counters)?;
-        }
-        let light = match (&targets.history, moving) {
-            (Some(history), Some((filled, _))) => Some((&history.diffuse[filled], &history.specular[filled])),
-            _ => targets.direct_diffuse.as_ref().zip(targets.direct_specular.as_ref()),
+        let direct = targets.direct_diffuse.as_ref().zip(targets.direct_specular.as_ref());
+        let Some((denoise, moving)) = self.denoise.as_ref().zip(moving) else {
+            return self.shading.record(recorder, scope, targets, parity, direct);
         };
-        self.shading.record(recorder, scope, targets, parity, light)
+        if denoise.composes() {
+            let [width, height] = scope.extent.map(|side| side.div_ceil(2));
+            let quads = Scope { extent: [width, height], rows: 0..height, ..*scope };
+            let traced = if moving.half_reflections { &quads } else { scope };
+            self.shading.record(recorder, traced, targets, parity, None)?;
+        }
+        let Some(signals) = denoise.record(recorder, scope, targets, parity, moving)? else { return Ok(()) };
+        if denoise.composes() {
+            return denoise.compose(recorder, scope, targets, parity, signals);
+        }
+        self.shading.record(recorder, scope, targets, parity, Some((signals[0], signals[1])))
     }
 }

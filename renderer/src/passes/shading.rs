@@ -1,4 +1,5 @@
-//! Pass `shading`: the radiance of every pixel. Enters: G-buffer and direct light. Leaves: `shaded`, linear HDR.
+//! Pass `shading`: the radiance of every pixel. Enters: G-buffer and direct light. Leaves: `shaded`, linear HDR;
+//! in frames that are denoised `reflected` and its tint.
 //! Reflection and refraction rays start in its ray generation shader; without any it is a compute pass.
 
 use caustica_gpu::{Bind, ComputePipeline, Image, RayTracingPipeline, Recorder};
@@ -21,7 +22,8 @@ impl Shading {
         Ok(Self::NoRays(builder.compute("shading", "passes/shading/shading.comp")?))
     }
 
-    /// Fills `shaded`. `light`: diffuse and specular direct light, this frame's or the denoised ones; `None`: no light.
+    /// Fills `shaded`, or `reflected` where rays are denoised. `light`: diffuse and specular direct light, this frame's or
+    /// the denoised ones; `None`: no light.
     pub(crate) fn record(
         &self,
         recorder: &mut Recorder,
@@ -41,6 +43,8 @@ impl Shading {
             ("direct_diffuse", Bind::Image(diffuse)),
             ("direct_specular", Bind::Image(specular)),
             ("shaded", Bind::Image(&targets.shaded)),
+            ("reflected", Bind::Image(&targets.reflected)),
+            ("reflected_tint", Bind::Image(&targets.reflected_tint)),
             ("ray_depth", Bind::Image(&targets.ray_depth)),
         ];
         let has_light = u32::from(light.is_some());

@@ -11,7 +11,16 @@ use crate::settings::Show;
 /// Images that the next frame reads as its past: two of each, taken in turns.
 pub(crate) struct History {
     pub(crate) diffuse: [Image; 2],
+    /// One texel, as the light of paths is whole.
     pub(crate) specular: [Image; 2],
+    /// One texel when no rays leave the first surfaces.
+    pub(crate) reflected: [Image; 2],
+    /// Of the reflected light, with the depth of its image; one texel as there.
+    pub(crate) image: [Image; 2],
+    /// Of direct light; one texel when nothing is filtered over space.
+    pub(crate) moments: [Image; 2],
+    /// Diffuse, specular and reflected light in turns between the steps of the filter; one texel as in the four above.
+    pub(crate) filtered: [[Image; 3]; 2],
 }
 
 /// The images of a view.
@@ -28,6 +37,9 @@ pub(crate) struct Targets {
     pub(crate) emissive: Option<Image>,
     pub(crate) direct_diffuse: Option<Image>,
     pub(crate) direct_specular: Option<Image>,
+    /// What rays bring, to be denoised; one texel when nothing is.
+    pub(crate) reflected: Image,
+    pub(crate) reflected_tint: Image,
     pub(crate) history: Option<History>,
     pub(crate) shaded: Image,
     /// One texel that is bound and never written unless the number of rays is shown and rays are traced.
@@ -58,15 +70,31 @@ impl Targets {
             if wanted { make(name, format) } else { one_texel(name, format) }
         };
         let pasts = if needs.temporal { 2 } else { 1 };
-        let light = needs.direct_light() && !needs.paths;
-        let history = if needs.temporal && light {
-            let pair = |name: &str| -> Result<[Image; 2]> {
-                Ok([make(name, Format::Rgba32Float)?, make(name, Format::Rgba32Float)?])
-            };
-            Some(History { diffuse: pair("history_diffuse")?, specular: pair("history_specular")? })
-        } else {
-            None
+        let light = needs.direct_light();
+        let denoises = needs.temporal && light;
+        let brought = denoises && (needs.reflection || needs.refraction);
+        let signal = |wanted: bool, name: &str| or_one_texel(wanted, name, Format::Rgba32Float);
+        let pair = |wanted: bool, name: &str| -> Result<[Image; 2]> {
+            Ok([signal(wanted, name)?, signal(wanted, name)?])
         };
+        let filtered = || -> Result<[Image; 3]> {
+            let wanted = needs.spatial;
+            Ok([
+                signal(wanted, "filtered_diffuse")?,
+                signal(wanted && !needs.paths, "filtered_specular")?,
+                signal(wanted && brought, "filtered_reflected")?,
+            ])
+        };
+        let history = denoises.then(|| -> Result<History> {
+            Ok(History {
+                diffuse: pair(true, "history_diffuse")?,
+                specular: pair(!needs.paths, "history_specular")?,
+                reflected: pair(brought, "history_reflected")?,
+                image: pair(brought, "history_image")?,
+                moments: pair(needs.spatial, "history_moments")?,
+                filtered: [filtered()?, filtered()?],
+            })
+        });
         let optional = |wanted: bool, name: &str, format| wanted.then(|| make(name, format)).transpose();
         Ok(Self {
             id: make("gbuffer_id", Format::Rgba32Uint)?,
@@ -78,9 +106,19 @@ impl Targets {
             material: make("gbuffer_material", Format::Rg16Float)?,
             motion: or_one_texel(needs.motion, "gbuffer_motion", Format::Rg32Float)?,
             emissive: optional(needs.emission, "gbuffer_emissive", Format::Rgba32Float)?,
-            direct_diffuse: optional(light, "direct_diffuse", Format::Rgba32Float)?,
-            direct_specular: optional(light, "direct_specular", Format::Rgba32Float)?,
-            history,
+            direct_diffuse: optional(
+                light && (denoises || !needs.paths),
+                "direct_diffuse",
+                Format::Rgba32Float,
+            )?,
+            direct_specular: optional(light && !needs.paths, "direct_specular", Format::Rgba32Float)?,
+            reflected: signal(brought, "reflected")?,
+            reflected_tint: or_one_texel(
+                brought || (denoises && needs.paths),
+                "reflected_tint",
+                Format::Rgba16Float,
+            )?,
+            history: history.transpose()?,
             shaded: make("shaded", Format::Rgba32Float)?,
             ray_depth: or_one_texel(
                 needs.ray_depth && (needs.paths || needs.secondary_rays()),

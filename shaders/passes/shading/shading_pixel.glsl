@@ -39,6 +39,16 @@ vec3 first_light(Surface surface, uvec2 pixel) {
     return radiance;
 }
 
+// Absorption on the camera's own segment, when it ends at the back of a volume: the camera is inside.
+vec3 seen_through(Scene scene, Surface surface, uint material, float distance_m) {
+    bool inside = surface_encloses(surface) && !surface.front;
+    return inside ? medium_transmittance(scene, material, distance_m) : vec3(1.0);
+}
+
+float camera_distance(Frame frame, uvec2 pixel, Surface surface) {
+    return length(surface.position - camera_ray(frame, camera_sample_position(frame, pixel)).origin);
+}
+
 vec3 background(Frame frame, Scene scene, uvec2 pixel) {
     return environment_radiance(scene, camera_ray(frame, camera_sample_position(frame, pixel)).direction);
 }

@@ -120,6 +120,7 @@ impl Dance {
         let options = RendererOptions {
             shaders: bench.shaders.clone(),
             acceleration: AccelPolicy { refit, ..AccelPolicy::default() },
+            ..RendererOptions::default()
         };
         let mut renderer = Renderer::new(&bench.device, &mut frames, &options)?;
         let view = renderer.create_view(EXTENT, plain(Pipeline::Raytraced), false)?;

@@ -1,0 +1,258 @@
+//! Arguments of `caustica render`, and the settings that they ask for.
+
+use std::path::PathBuf;
+
+use caustica_renderer::{NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Show, ToneMap, ViewSettings};
+use clap::{ArgGroup, Args, ValueEnum};
+use serde_json::json;
+
+use crate::cli::output;
+
+/// Arguments of `caustica render`.
+#[derive(Args, Debug)]
+#[command(group(ArgGroup::new("until").args(["samples", "time", "target_error"])))]
+pub(in crate::cli) struct RenderArgs {
+    /// A project, .gltf, .glb or .obj
+    pub(super) file: PathBuf,
+    /// Where the image goes: .png (tone mapped) or .exr (radiance)
+    #[arg(short, long, value_name = "OUT", value_parser = parse_output)]
+    pub(super) output: PathBuf,
+    /// How the image is made
+    #[arg(long, value_enum)]
+    pipeline: Option<PipelineArg>,
+    /// Size in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1280x720")]
+    pub(super) size: [u32; 2],
+    /// Samples a pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(super) samples: Option<u64>,
+    /// Seconds to render
+    #[arg(long, value_name = "SECONDS", value_parser = parse_positive)]
+    pub(super) time: Option<f64>,
+    /// Stop at this noise: sqrt(relMSE) estimated from two independent streams, 0.01 is 1 %
+    #[arg(long, value_name = "X", value_parser = parse_positive)]
+    pub(super) target_error: Option<f64>,
+    /// Show the scene at this time of its animation; past the end of a clip it begins again. Without it: at rest
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub(super) at: Option<f64>,
+    /// Name of the camera
+    #[arg(long)]
+    pub(super) camera: Option<String>,
+    /// An environment map (.hdr, .exr), or a constant radiance R,G,B
+    #[arg(long, value_name = "FILE|R,G,B")]
+    pub(super) environment: Option<String>,
+    /// Where random numbers come from. A Hammersley set is made for half of --samples, as there are two streams; without
+    /// --samples, for 256
+    #[arg(long, value_enum)]
+    sampler: Option<SamplerArg>,
+    /// Seed of all random numbers
+    #[arg(long)]
+    seed: Option<u32>,
+    /// Reflections and refractions after the first surface; bounces in `path`, where the default is no limit
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1024))]
+    max_depth: Option<u32>,
+    /// In `path`, reflect the light too that rough surfaces scatter more than once (off: glTF to the letter)
+    #[arg(long)]
+    multiple_scattering: bool,
+    /// Shadow rays a light and pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    shadow_rays: Option<u32>,
+    /// First sample of a set that is rendered in parts
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 47))]
+    pub(super) sample_offset: u64,
+    /// With --denoise, which pixels trace reflected light in a frame: each, or one of 2x2 in turns
+    #[arg(long, value_enum)]
+    reflection_rate: Option<RateArg>,
+    /// How `hybrid` finds the first surfaces: `auto` as is faster on the device, by its profile
+    #[arg(long, value_enum)]
+    primary: Option<PrimaryArg>,
+    /// Leave out what the scene does not need, or build everything
+    #[arg(long, value_enum)]
+    needs: Option<NeedsArg>,
+    /// Exposure in stops
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = parse_finite)]
+    exposure: Option<f32>,
+    /// Tone map of a PNG
+    #[arg(long, value_enum)]
+    tone_map: Option<ToneMapArg>,
+    /// What a PNG shows: the image, or a step on the way such as base_color, normal, depth
+    #[arg(long, value_name = "VIEW", value_parser = parse_show, long_help = show_help())]
+    show: Option<Show>,
+    /// Filter the picture: over the frames alone, or over space too. Less noise for a bias that is not known
+    #[arg(long, value_enum, conflicts_with_all = ["target_error", "sample_offset"], default_missing_value = "full", num_args = 0..=1)]
+    denoise: Option<DenoiseArg>,
+    /// The light of `--show shadow`: its name, or its number from 1; without it the first that shines
+    #[arg(long, value_name = "NAME|N")]
+    pub(super) show_light: Option<String>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PipelineArg {
+    Raster,
+    Hybrid,
+    Raytraced,
+    Path,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum DenoiseArg {
+    Off,
+    Temporal,
+    Full,
+}
+
+impl RenderArgs {
+    /// The picture is to be denoised.
+    pub(super) fn denoises(&self) -> bool {
+        self.denoise.is_some_and(|denoise| denoise != DenoiseArg::Off)
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum RateArg {
+    Full,
+    Half,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PrimaryArg {
+    Auto,
+    Raster,
+    Rays,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum NeedsArg {
+    Auto,
+    All,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ToneMapArg {
+    Linear,
+    Aces,
+    Agx,
+    Neutral,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SamplerArg {
+    /// Owen-scrambled Sobol points
+    Sobol,
+    /// Halton points, scrambled a pixel
+    Halton,
+    /// Hammersley sets: even when complete, like independent numbers before
+    Hammersley,
+    /// Independent numbers (hashed PCG)
+    Independent,
+    /// Sobol points with offsets that make errors of neighbouring pixels cancel
+    BlueNoise,
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
+    let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));
+    match [side(width)?, side(height)?] {
+        [0, _] | [_, 0] => Err(String::from("a side of 0 pixels")),
+        size => Ok(size),
+    }
+}
+
+fn parse_positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
+        _ => Err(String::from("expected a number above 0")),
+    }
+}
+
+fn parse_finite(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        _ => Err(String::from("expected a number")),
+    }
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
+        _ => Err(String::from("expected a number of seconds, 0 or more")),
+    }
+}
+
+fn parse_output(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    output::kind_of(&path).map(|_| path).map_err(|error| error.to_string())
+}
+
+fn parse_show(text: &str) -> Result<Show, String> {
+    serde_json::from_value(json!(text)).map_err(|_| {
+        let names: Vec<String> = show_names().map(|(_, name)| name).collect();
+        format!("one of {}", names.join(", "))
+    })
+}
+
+/// Every view with its name on the command line.
+fn show_names() -> impl Iterator<Item = (Show, String)> {
+    let name = |show| serde_json::to_value(show).ok()?.as_str().map(str::to_owned);
+    Show::ALL.into_iter().filter_map(move |(show, _)| Some((show, name(show)?)))
+}
+
+fn show_help() -> String {
+    let lines: Vec<String> =
+        show_names().map(|(show, name)| format!("  {name:16} {}", show.meaning())).collect();
+    format!("What a PNG shows: the image, or a step on the way:\n{}", lines.join("\n"))
+}
+
+/// The settings that the arguments ask for, else those of the project.
+pub(super) fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSettings {
+    ViewSettings {
+        pipeline: args.pipeline.map_or(of_project.pipeline, |pipeline| match pipeline {
+            PipelineArg::Raster => Pipeline::Raster,
+            PipelineArg::Hybrid => Pipeline::Hybrid,
+            PipelineArg::Raytraced => Pipeline::Raytraced,
+            PipelineArg::Path => Pipeline::Path,
+        }),
+        needs: args.needs.map_or(of_project.needs, |needs| match needs {
+            NeedsArg::Auto => NeedsMode::Auto,
+            NeedsArg::All => NeedsMode::All,
+        }),
+        reflection_rate: args.reflection_rate.map_or(of_project.reflection_rate, |rate| match rate {
+            RateArg::Full => ReflectionRate::Full,
+            RateArg::Half => ReflectionRate::Half,
+        }),
+        primary: args.primary.map_or(of_project.primary, |primary| match primary {
+            PrimaryArg::Auto => Primary::Auto,
+            PrimaryArg::Raster => Primary::Raster,
+            PrimaryArg::Rays => Primary::Rays,
+        }),
+        tone_map: args.tone_map.map_or(of_project.tone_map, |tone_map| match tone_map {
+            ToneMapArg::Linear => ToneMap::Linear,
+            ToneMapArg::Aces => ToneMap::Aces,
+            ToneMapArg::Agx => ToneMap::Agx,
+            ToneMapArg::Neutral => ToneMap::Neutral,
+        }),
+        show: args.show.unwrap_or_default(),
+        exposure_ev: args.exposure.unwrap_or(of_project.exposure_ev),
+        sampler: args.sampler.map_or(of_project.sampler, |sampler| match sampler {
+            SamplerArg::Sobol => Sampler::Sobol,
+            SamplerArg::Halton => Sampler::Halton,
+            SamplerArg::Hammersley => Sampler::Hammersley,
+            SamplerArg::Independent => Sampler::Independent,
+            SamplerArg::BlueNoise => Sampler::BlueNoise,
+        }),
+        seed: args.seed.unwrap_or(of_project.seed),
+        max_depth: args.max_depth.unwrap_or(of_project.max_depth),
+        path_depth: args.max_depth.or(of_project.path_depth),
+        multiple_scattering: args.multiple_scattering || of_project.multiple_scattering,
+        shadow_rays: args.shadow_rays.unwrap_or(of_project.shadow_rays),
+        temporal: args.denoises(),
+        spatial: args.denoise == Some(DenoiseArg::Full),
+        denoise_stills: args.denoises(),
+        // A still keeps all of its frames.
+        temporal_max_history: if args.denoises() { f32::MAX } else { of_project.temporal_max_history },
+        ..of_project
+    }
+}

@@ -1,0 +1,173 @@
+//! Denoising: less noise at little bias, also of what mirrors show while the camera moves; nothing of the past where
+//! something else is seen now; and nothing at all of it when it is off.
+#![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
+
+use caustica_renderer::delta::{Camera, InstanceId, Light, Material, SceneDelta};
+use caustica_renderer::{Pipeline, ReflectionRate, ViewSettings};
+use caustica_tests::scene::{Scene, camera_at, lambert, mirror, quad, zoo};
+use caustica_tests::studio::Studio;
+use glam::{Affine3A, Vec3};
+
+const EXTENT: [u32; 2] = [96, 64];
+
+/// One sample a frame, without jitter: edges and textures are the same in all frames, and noise is all that differs.
+fn settings(pipeline: Pipeline) -> ViewSettings {
+    ViewSettings { pipeline, jitter: false, ..ViewSettings::default() }
+}
+
+fn still(pipeline: Pipeline) -> ViewSettings {
+    ViewSettings { temporal: false, ..settings(pipeline) }
+}
+
+/// mean((x - r)^2 / (r^2 + 0.01)) over all channels.
+fn rel_mse(image: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
+    let terms = image.iter().flatten().zip(reference.iter().flatten()).map(|(x, r)| {
+        let (x, r) = (f64::from(*x), f64::from(*r));
+        (x - r) * (x - r) / (r * r + 0.01)
+    });
+    terms.sum::<f64>() / (image.len() * 3) as f64
+}
+
+fn mean_of(image: &[[f32; 3]]) -> f64 {
+    image.iter().flatten().map(|x| f64::from(*x)).sum::<f64>() / (image.len() * 3) as f64
+}
+
+/// Denoised frames of one sample each are at least `gains` times nearer to the mean of many than one sample is, the first
+/// frame and the one after some, and no brighter or darker than by `bias_max`.
+fn one_sample_gains(pipeline: Pipeline, samples: u64, gains: [f64; 2], bias_max: f64) {
+    let (scene, camera) = zoo();
+    let mut studio = Studio::of(EXTENT, settings(pipeline), &scene.delta, camera);
+    let noisy = studio.mean(1).mean;
+    let reference = studio.mean(samples).mean;
+    let before = rel_mse(&noisy, &reference);
+    studio.set(|settings| settings.denoise_stills = true);
+    for (frames, gain) in [1, 7].into_iter().zip(gains) {
+        studio.frames(frames);
+        let filtered = studio.read_frame();
+        let after = rel_mse(&filtered, &reference);
+        let bias = mean_of(&filtered) / mean_of(&reference) - 1.0;
+        let what =
+            format!("{}: relMSE {before:.4} -> {after:.4}, mean {:+.2} %", pipeline.name(), bias * 100.0);
+        println!("{what}");
+        assert!(after * gain <= before, "{what}");
+        assert!(bias.abs() < bias_max, "{what}");
+    }
+}
+
+#[test]
+fn denoised_frames_of_hybrid_are_nearer_to_the_mean() {
+    one_sample_gains(Pipeline::Hybrid, 48, [1.7, 4.0], 0.03);
+}
+
+#[test]
+fn denoised_frames_of_paths_are_nearer_to_the_mean() {
+    // Lone bright pixels lose their light: as much as 7 % of all there is in the first frame.
+    one_sample_gains(Pipeline::Path, 64, [4.0, 4.0], 0.1);
+}
+
+/// A floor under a large lamp with a board over it, seen by a mirror that fills the image: its soft shadow is
+/// everything there is.
+fn shadow_in_mirror() -> (Scene, InstanceId) {
+    let mut scene = Scene::new();
+    let lying = Affine3A::from_rotation_x(-std::f32::consts::FRAC_PI_2);
+    scene.put(quad(40.0, 40.0), lambert(0.7), lying);
+    let board = Material { double_sided: true, ..lambert(0.5) };
+    let above = Affine3A::from_translation(Vec3::new(0.0, 0.9, 0.0)) * lying;
+    let board = scene.put(quad(1.2, 1.2), board, above);
+    let facing = Affine3A::from_translation(Vec3::new(0.0, 1.5, -2.0));
+    scene.put(quad(30.0, 3.0), Material { double_sided: true, ..mirror() }, facing);
+    scene.light(Light::Point {
+        position: Vec3::new(0.0, 3.0, 0.5),
+        intensity: Vec3::splat(20.0),
+        radius_m: 0.5,
+        range_m: f32::INFINITY,
+    });
+    (scene, board)
+}
+
+fn passing_by(x: f32) -> Camera {
+    camera_at(Vec3::new(x, 1.6, 2.5), Vec3::new(x, 0.6, -2.0), 0.6)
+}
+
+/// Radiance after `frames` frames in which the camera moves to `x` = 0.
+fn while_moving(studio: &mut Studio, frames: u16) -> Vec<[f32; 3]> {
+    for i in (0..frames).rev() {
+        studio.view_mut().set_camera(passing_by(0.02 * f32::from(i)));
+        studio.frames(1);
+    }
+    studio.read_frame()
+}
+
+#[test]
+fn a_soft_shadow_in_a_mirror_converges_while_the_camera_moves() {
+    let (scene, _) = shadow_in_mirror();
+    let mut studio = Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, passing_by(0.0));
+    let noisy = studio.mean(1).mean;
+    let reference = studio.mean(96).mean;
+    let before = rel_mse(&noisy, &reference);
+    let (full, half) = (ReflectionRate::Full, ReflectionRate::Half);
+    for (spatial, rate) in [(false, full), (true, full), (true, half)] {
+        studio.set(|settings| (settings.spatial, settings.reflection_rate) = (spatial, rate));
+        studio.view_mut().set_camera(passing_by(1.0));
+        studio.frames(1);
+        let moved = while_moving(&mut studio, 16);
+        assert_eq!(studio.view().samples(), 0, "every frame moved");
+        let after = rel_mse(&moved, &reference);
+        let what = format!("spatial {spatial}, {rate:?}: relMSE {before:.5} -> {after:.5}");
+        println!("{what}");
+        assert!(after * 3.0 <= before, "{what}");
+    }
+}
+
+/// A board that was in front of the camera leaves nothing behind in the frame after it went, on the wall or in its image.
+#[test]
+fn what_was_hidden_has_no_past() {
+    let mut scene = Scene::new();
+    scene.put(quad(8.0, 8.0), lambert(0.6), Affine3A::from_translation(Vec3::new(0.0, 0.0, -3.0)));
+    let shining = Material { double_sided: true, ..lambert(0.02) };
+    let board = scene.put(quad(1.0, 4.0), shining, Affine3A::IDENTITY);
+    scene.light(Light::Point {
+        position: Vec3::new(0.0, 2.0, 4.0),
+        intensity: Vec3::splat(100.0),
+        radius_m: 0.2,
+        range_m: f32::INFINITY,
+    });
+    let camera = camera_at(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 0.7);
+    let away = SceneDelta {
+        transforms: vec![(board, Affine3A::from_translation(Vec3::new(60.0, 0.0, 0.0)))],
+        reason: String::from("moved"),
+        ..SceneDelta::default()
+    };
+    for pipeline in [Pipeline::Hybrid, Pipeline::Path] {
+        let mut studio = Studio::of(EXTENT, settings(pipeline), &scene.delta, camera);
+        for i in 0..8 {
+            let near = Affine3A::from_translation(Vec3::new(0.0, 0.001 * i as f32, 0.0));
+            studio.frame(&SceneDelta { transforms: vec![(board, near)], ..away.clone() });
+        }
+        studio.frame(&away);
+        assert_eq!(studio.view().samples(), 0);
+        let after = studio.read_frame();
+        let expected = studio.mean(64).mean;
+        let centre = (EXTENT[1] / 2 * EXTENT[0] + EXTENT[0] / 2) as usize;
+        let (seen, wanted) = (f64::from(after[centre][1]), f64::from(expected[centre][1]));
+        assert!((seen / wanted - 1.0).abs() < 0.1, "{}: {seen} instead of {wanted}", pipeline.name());
+    }
+}
+
+#[test]
+fn nothing_is_denoised_when_it_is_off() {
+    let (scene, _) = shadow_in_mirror();
+    let run = |settings| {
+        let mut studio = Studio::of(EXTENT, settings, &scene.delta, passing_by(0.0));
+        let mean = studio.mean(3).mean;
+        (mean, studio.statistics())
+    };
+    let ((off, figures), (on, figures_on)) = (run(still(Pipeline::Hybrid)), run(settings(Pipeline::Hybrid)));
+    assert_eq!(off, on, "a view that stands still is the mean of its samples");
+    for what in ["temporal denoising", "spatial denoising"] {
+        assert!(figures.left_out.iter().any(|left| left.what == what), "{what} is listed as left out");
+        assert!(figures_on.left_out.iter().all(|left| left.what != what), "{what} is used");
+    }
+    let bytes = |memory: &[(String, u64)]| memory.iter().map(|(_, bytes)| *bytes).sum::<u64>();
+    assert!(bytes(&figures.memory) < bytes(&figures_on.memory), "targets of the denoiser are not made");
+}

@@ -1,6 +1,5 @@
 //! Denoising: less noise at little bias, also of what mirrors show while the camera moves; nothing of the past where
 //! something else is seen now; and nothing at all of it when it is off.
-#![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
 use caustica_renderer::delta::{Camera, InstanceId, Light, Material, SceneDelta};
 use caustica_renderer::{Pipeline, ReflectionRate, ViewSettings};

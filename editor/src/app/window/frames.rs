@@ -220,8 +220,9 @@ impl EditorWindow {
         let fresh = full.is_some_and(|full| self.shown.as_ref() == Some(&self.key(full)));
         let whole = self.editor.state.view.divisor == 1;
         let unfinished = full.is_some_and(|full| {
-            !self.broken.as_ref().is_some_and(|broken| broken.holds(&self.key(full)))
-                && !(fresh && whole && self.editor.session.is_done())
+            let fails = self.broken.as_ref().is_some_and(|broken| broken.holds(&self.key(full)));
+            let finished = fresh && whole && self.editor.session.is_done();
+            !(fails || finished)
         });
         // While an animation plays the next picture is due, and with it the panels: time goes on there.
         let plays = self.editor.state.playback.playing;

@@ -65,10 +65,8 @@ fn what_the_scene_does_not_need_changes_nothing() {
         studio.set(|settings| settings.seed = 0);
         let (all, nothing) = (studio.mean(2), studio.statistics().left_out);
         assert!(left_out.len() >= 6, "{left_out:?}");
-        // A raster view casts no rays and paths are not filtered, whatever they are told; lobes come with the scene.
-        let of_pipeline = |what: &str| pipeline == Pipeline::Path && what == "temporal denoising";
-        let expected = |what: &str| what == "coats, sheen, films and other lobes" || of_pipeline(what);
-        let as_told = nothing.iter().all(|left| expected(&left.what));
+        // A raster view casts no rays, whatever it is told; lobes come with the scene.
+        let as_told = nothing.iter().all(|left| left.what == "coats, sheen, films and other lobes");
         assert!(as_told || pipeline == Pipeline::Raster, "{nothing:?}");
         assert_eq!(bits(&auto), bits(&all), "bare scene, {}", pipeline.name());
     }

@@ -83,23 +83,23 @@ pub struct SceneDelta {
 impl SceneDelta {
     /// Whether applying this delta would do nothing.
     pub fn is_empty(&self) -> bool {
-        !self.names_more_than_motion()
+        !self.names_more_than_instances()
+            && self.instances.is_empty()
+            && self.removed_instances.is_empty()
             && self.transforms.is_empty()
             && self.visibility.is_empty()
             && self.poses.is_empty()
     }
 
-    /// Whether it holds more than transforms, visibility and poses of instances.
-    pub(crate) fn names_more_than_motion(&self) -> bool {
+    /// Whether it holds more than instances, their transforms, visibility and poses.
+    pub(crate) fn names_more_than_instances(&self) -> bool {
         !(self.meshes.is_empty()
             && self.removed_meshes.is_empty()
             && self.textures.is_empty()
             && self.removed_textures.is_empty()
             && self.materials.is_empty()
             && self.removed_materials.is_empty()
-            && self.instances.is_empty()
             && self.primitive_transforms.is_empty()
-            && self.removed_instances.is_empty()
             && self.lights.is_empty()
             && self.removed_lights.is_empty()
             && self.environment.is_none()

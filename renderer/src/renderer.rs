@@ -9,7 +9,7 @@ use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse
 use glam::{Affine3A, Vec3};
 
 use crate::accel::{Accel, AccelPolicy};
-use crate::delta::{InstanceId, Invalidation, SceneDelta};
+use crate::delta::{Instance, InstanceId, Invalidation, SceneDelta};
 use crate::error::{RendererError, Result};
 use crate::frame;
 use crate::gpu_types::AccumulatorPixel;
@@ -21,7 +21,7 @@ use crate::sampling::Sampling;
 use crate::settings::{Pipeline, Primary, ViewSettings};
 use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
 use crate::summary::Summary;
-use crate::tables::{Changed, Tables};
+use crate::tables::{Changed, Tables, is_degenerate};
 use crate::view::{CameraMatrices, View, ViewId};
 
 /// How to make a renderer.
@@ -380,16 +380,22 @@ impl Renderer {
     }
 }
 
-/// Whether a delta changes what any ray can meet: hidden instances may move, and others stay where they are.
+/// Whether a delta changes what any ray can meet: hidden instances and those without size may come, move and go, and others stay where they are.
 fn changes_image(delta: &SceneDelta, tables: &Tables) -> bool {
     let entry = |id: &InstanceId| tables.instances.slot_of(*id).and_then(|slot| tables.instances.get(slot));
-    let shown = |id: &InstanceId| entry(id).is_none_or(|entry| entry.instance.visibility.shown);
-    let elsewhere = |map: &Affine3A, id: &InstanceId| {
-        entry(id).is_none_or(|entry| entry.instance.render_from_mesh != *map)
+    let met = |id: &InstanceId| entry(id).is_some_and(|e| e.instance.visibility.shown && !e.degenerate);
+    let will_be_met = |new: &Instance| new.visibility.shown && !is_degenerate(&new.render_from_mesh);
+    let moves = |id: &InstanceId, map: &Affine3A| {
+        entry(id).is_none_or(|e| {
+            let solid = !(e.degenerate && is_degenerate(map));
+            solid && e.instance.visibility.shown && e.instance.render_from_mesh != *map
+        })
     };
-    delta.names_more_than_motion()
-        || delta.transforms.iter().any(|(id, map)| shown(id) && elsewhere(map, id))
-        || delta.poses.iter().any(|(id, _)| shown(id))
+    delta.names_more_than_instances()
+        || delta.instances.iter().any(|(id, new)| met(id) || will_be_met(new))
+        || delta.removed_instances.iter().any(met)
+        || delta.transforms.iter().any(|(id, map)| moves(id, map))
+        || delta.poses.iter().any(|(id, _)| entry(id).is_none_or(|e| e.instance.visibility.shown))
         || delta
             .visibility
             .iter()

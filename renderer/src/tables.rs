@@ -28,7 +28,7 @@ use std::sync::Arc;
 use caustica_gpu::{Access, Device, Recorder, ResourceId, Stage, Use};
 
 pub(crate) use draws::Batch;
-pub(crate) use instances::{Instances, Slot};
+pub(crate) use instances::{Instances, Slot, is_degenerate};
 pub(crate) use materials::{Materials, emits, has_alpha, is_opaque, shows_both_sides, transmits};
 pub(crate) use meshes::{MeshBuffers, Meshes, rows_of};
 pub use sheen::albedo_table as sheen_albedo_table;

@@ -1,7 +1,7 @@
 //! Acceleration structures where little is left: the last instance, an instance that nobody sees, a mesh that is edited before
 //! it was ever built, everything exchanged in one frame.
 
-use caustica_renderer::delta::{Camera, InstanceId, SceneDelta, Visibility};
+use caustica_renderer::delta::{Camera, Instance, InstanceId, SceneDelta, Visibility};
 use caustica_renderer::{AccelPolicy, Pipeline, TlasWork, ViewSettings};
 use caustica_tests::scene::{Scene, camera_at, cube, lambert, sphere};
 use caustica_tests::studio::Studio;
@@ -71,8 +71,16 @@ fn what_nobody_sees_moves_without_a_reset() {
     studio.frame(&SceneDelta { transforms: vec![(ids[0], shift(1.0))], ..SceneDelta::default() });
     let after = studio.statistics();
     assert_eq!((after.resets, after.samples), (before.resets, before.samples + 1));
-    studio.frame(&SceneDelta { transforms: vec![(ids[1], shift(0.2))], ..SceneDelta::default() });
-    assert_eq!(studio.statistics().resets, before.resets + 1);
+    let copy = InstanceId { node: 77, part: 0 };
+    let unseen = Instance { visibility: hidden, ..scene.delta.instances[0].1.clone() };
+    studio.frame(&SceneDelta { instances: vec![(copy, unseen)], ..SceneDelta::default() });
+    studio.frame(&SceneDelta { removed_instances: vec![copy], ..SceneDelta::default() });
+    assert_eq!(studio.statistics().resets, before.resets, "a hidden copy came and went");
+    let scaled = |scale: f32| Affine3A::from_scale(Vec3::splat(scale));
+    for (map, resets) in [(scaled(0.0), 1), (scaled(f32::INFINITY), 1), (shift(0.2), 2)] {
+        studio.frame(&SceneDelta { transforms: vec![(ids[1], map)], ..SceneDelta::default() });
+        assert_eq!(studio.statistics().resets, before.resets + resets, "{map:?}");
+    }
 }
 
 #[test]

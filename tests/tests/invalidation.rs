@@ -106,8 +106,9 @@ fn a_frame_in_motion_shows_the_moved_object() {
             a.iter().zip(b).map(|(p, q)| (p[0] - q[0]).abs()).sum::<f32>() / a.len() as f32
         };
         let (to_old, to_new) = (distance(&moving, &before), distance(&moving, &expected));
+        // One sample a pixel, filtered: what is left is the shadow's edge, blurred.
         assert!(
-            to_new < 0.25 * to_old && to_new < 0.02,
+            to_new < 0.35 * to_old && to_new < 0.01,
             "{}: {to_new} from the new, {to_old} from the old",
             pipeline.name()
         );

@@ -106,7 +106,7 @@ fn drag<T: Numeric>(ui: &mut Ui, value: &mut T, range: RangeInclusive<T>, speed:
             .range(range)
             .clamp_existing_to_range(false)
             .speed(speed)
-            .max_decimals(6)
+            .max_decimals(if T::INTEGRAL { 0 } else { 6 })
             .suffix(suffix)
             .update_while_editing(false),
     );

@@ -34,7 +34,8 @@ impl Desktop {
         let folder = tempfile::tempdir().expect("a folder");
         let screen = format!("{}x{}x24", extent[0], extent[1]);
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &screen, "-fbdir"])
+            // No reset when a client leaves: the next one might find the door shut.
+            .args(["-noreset", "-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &screen, "-fbdir"])
             .arg(folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

@@ -150,6 +150,8 @@ fn what_cannot_be_seen_changes_nothing_else() {
             ..SceneDelta::default()
         };
         for (name, visible, transform) in unseen() {
+            // Seen in between: what is unseen before and after keeps its samples.
+            studio.apply(&with(true, in_front()));
             studio.apply(&with(visible, transform));
             let image = studio.mean(3);
             assert_eq!(differing(&without, &image, 1e-6), 0, "{name}, {}", pipeline.name());

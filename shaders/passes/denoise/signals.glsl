@@ -5,7 +5,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 
 #include "shared/frame.glsl"
-#include "shared/needs.glsl"
+#include "lib/light_signals.glsl"
 #include "lib/octahedral.glsl"
 #include "lib/vector.glsl"
 
@@ -19,8 +19,6 @@ layout(set = 1, binding = 6) uniform texture2D in_reflected;
 layout(set = 1, binding = 7, rgba32f) uniform writeonly image2D out_diffuse;
 layout(set = 1, binding = 8, rgba32f) uniform writeonly image2D out_specular;
 layout(set = 1, binding = 9, rgba32f) uniform writeonly image2D out_reflected;
-
-const bool HAS_REFLECTED = NEEDS_REFLECTION || NEEDS_REFRACTION;
 
 // Exponent of the cosine between normals.
 const float NORMAL_POWER = 64.0;
@@ -48,11 +46,6 @@ struct Place {
     float image_depth;
     float image_least;
 };
-
-// A path's light is whole: it has no specular signal.
-bool has_specular(Frame frame) {
-    return (frame.flags & FRAME_PATHS_BEND) == 0u;
-}
 
 Signals signals_at(Frame frame, ivec2 p) {
     Signals signals;

@@ -9,9 +9,9 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "shared/frame.glsl"
-#include "shared/needs.glsl"
 #include "lib/camera.glsl"
 #include "lib/element.glsl"
+#include "lib/light_signals.glsl"
 #include "lib/octahedral.glsl"
 
 layout(set = 1, binding = 0) uniform utexture2D gbuffer_id;
@@ -32,8 +32,6 @@ layout(set = 1, binding = 14, rgba32f) uniform writeonly image2D history_specula
 layout(set = 1, binding = 15, rgba32f) uniform writeonly image2D history_reflected;
 layout(set = 1, binding = 16, rgba32f) uniform writeonly image2D history_moments;   // of diffuse and of specular light
 layout(set = 1, binding = 17, rgba32f) uniform writeonly image2D history_image;     // moments of the reflected light, reverse depth of its image
-
-const bool HAS_REFLECTED = NEEDS_REFLECTION || NEEDS_REFRACTION;
 
 // Normals further apart than this belong to different surfaces (cosine of 25 degrees).
 const float SAME_NORMAL = 0.906;
@@ -86,11 +84,6 @@ vec3 mean(Moments moments, float count) {
 vec3 deviation(Moments moments, float count) {
     vec3 average = moments.sum / count;
     return sqrt(max(moments.sum_of_squares / count - average * average, vec3(0.0)));
-}
-
-// A path's light is whole.
-bool has_specular(Frame frame) {
-    return (frame.flags & FRAME_PATHS_BEND) == 0u;
 }
 
 vec3 direct_specular_at(Frame frame, ivec2 at) {

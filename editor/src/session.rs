@@ -57,7 +57,8 @@ pub struct Pick {
 
 /// A document, its history, its renderer and one view.
 pub struct Session {
-    document: Document,
+    /// Shared while a worker reads it: an edit in that time copies it first.
+    document: Arc<Document>,
     history: History,
     meta: ProjectMeta,
     path: Option<PathBuf>,
@@ -97,7 +98,7 @@ impl Session {
             renderer.view_mut(view)?.set_submit_budget(Some(SUBMIT_BUDGET_MS));
         }
         Ok(Self {
-            document: Document::new(),
+            document: Arc::default(),
             history: History::new(),
             meta: ProjectMeta::default(),
             path: None,
@@ -132,6 +133,12 @@ impl Session {
         &self.document
     }
 
+    /// The document for a worker to read. What changes it meanwhile copies it first, and so does the next frame while it has
+    /// changes that wait for that frame.
+    pub fn shared_document(&self) -> Arc<Document> {
+        Arc::clone(&self.document)
+    }
+
     /// Names of the lights, in order, with their ids in the renderer.
     pub fn light_names(&self) -> Vec<(LightId, String)> {
         let named = |target| (instance_id(target), self.document.display_name(target));
@@ -160,7 +167,7 @@ impl Session {
     pub fn push(&mut self, edit: Edit) -> Result<(), EditError> {
         let label = edit.describe(&self.document);
         self.note_picture(&edit);
-        let inverse = self.document.apply(edit.clone())?;
+        let inverse = Arc::make_mut(&mut self.document).apply(edit.clone())?;
         self.history.record(label, edit, inverse);
         Ok(())
     }
@@ -179,7 +186,7 @@ impl Session {
     /// # Errors
     /// When the edit does not fit the document, which stays as it was.
     pub fn edit_with<T>(&mut self, make: impl FnOnce(&mut Document) -> (T, Edit)) -> Result<T, EditError> {
-        let (value, edit) = make(&mut self.document);
+        let (value, edit) = make(Arc::make_mut(&mut self.document));
         self.push(edit)?;
         Ok(value)
     }
@@ -189,7 +196,7 @@ impl Session {
     /// # Errors
     /// When the description makes no shapes.
     pub fn add_shapes(&mut self, name: &str, source: ShapeSource, local: Local) -> Result<NodeId, EditError> {
-        let (node, edit) = files::shapes_edit(&mut self.document, name, source, local)?;
+        let (node, edit) = files::shapes_edit(Arc::make_mut(&mut self.document), name, source, local)?;
         self.push(edit)?;
         Ok(node)
     }
@@ -203,7 +210,7 @@ impl Session {
     pub fn cancel_gesture(&mut self) {
         if let Some(step) = self.history.cancel_gesture() {
             self.note_picture(&step.edit);
-            if let Err(error) = self.document.apply_back(step.edit) {
+            if let Err(error) = Arc::make_mut(&mut self.document).apply_back(step.edit) {
                 tracing::error!("taking a gesture back failed: {error}");
             }
         }
@@ -213,7 +220,7 @@ impl Session {
     pub fn undo(&mut self) -> Option<String> {
         let step = self.history.take_undo()?;
         self.note_picture(&step.edit);
-        match self.document.apply_back(step.edit.clone()) {
+        match Arc::make_mut(&mut self.document).apply_back(step.edit.clone()) {
             Ok(redo) => self.history.put_redo(&step, redo),
             Err(error) => tracing::error!("undo of '{}' failed: {error}", step.label),
         }
@@ -224,7 +231,7 @@ impl Session {
     pub fn redo(&mut self) -> Option<String> {
         let step = self.history.take_redo()?;
         self.note_picture(&step.edit);
-        match self.document.apply_back(step.edit.clone()) {
+        match Arc::make_mut(&mut self.document).apply_back(step.edit.clone()) {
             Ok(undo) => self.history.put_undo(&step, undo),
             Err(error) => tracing::error!("redo of '{}' failed: {error}", step.label),
         }
@@ -246,11 +253,9 @@ impl Session {
     /// As [`Self::open`].
     pub fn open_at(&mut self, path: &Path, loaded: Loaded, time_s: Option<f64>) -> anyhow::Result<()> {
         let opened = files::open(path, loaded)?;
-        self.document = opened.document;
         self.meta = opened.meta;
         self.path = opened.path;
-        self.document.mark_all_added("opened a file");
-        self.replace_scene()?;
+        self.replace_scene(opened.document, "opened a file")?;
         if let Some(settings) = opened.settings {
             self.set_settings(settings);
         }
@@ -268,7 +273,7 @@ impl Session {
     /// Shows the scene at a time, seconds; `None`: at rest. It is no edit: history and file know nothing of it.
     pub fn set_time(&mut self, time_s: Option<f64>) {
         if self.document.time() != time_s {
-            self.document.set_time(time_s);
+            Arc::make_mut(&mut self.document).set_time(time_s);
             self.picture_revision += 1;
         }
     }
@@ -288,17 +293,17 @@ impl Session {
     /// # Errors
     /// When the driver refuses.
     pub fn new_document(&mut self) -> anyhow::Result<()> {
-        self.document = Document::new();
         self.meta = ProjectMeta::default();
         self.path = None;
-        self.document.mark_all_added("new scene");
-        self.replace_scene()?;
+        self.replace_scene(Document::new(), "new scene")?;
         self.camera = ViewCamera::default();
         Ok(())
     }
 
     /// Empties the renderer's scene before another document is synced.
-    fn replace_scene(&mut self) -> anyhow::Result<()> {
+    fn replace_scene(&mut self, mut document: Document, reason: &str) -> anyhow::Result<()> {
+        document.mark_all_added(reason);
+        self.document = Arc::new(document);
         self.empty_renderer()?;
         self.picture_revision += 1;
         self.history.clear();
@@ -314,7 +319,7 @@ impl Session {
     /// For a project, which can only be opened, and when the edit does not fit.
     pub fn import(&mut self, loaded: Loaded) -> anyhow::Result<Option<NodeId>> {
         let was_empty = self.document.node_count() == 0;
-        let node = files::import(&mut self.document, loaded)?;
+        let node = files::import(Arc::make_mut(&mut self.document), loaded)?;
         let (edit, node) = (node.edit, node.node);
         self.push(edit)?;
         if was_empty {

@@ -57,28 +57,33 @@ impl Sync {
     /// Drains the document's changes into a delta; `eye` is the world position of the active view's camera.
     pub fn delta(&mut self, document: &mut Document, eye: DVec3) -> SceneDelta {
         let changes = document.drain_changes();
+        self.delta_of(document, &changes, eye)
+    }
+
+    /// The same of changes that were drained.
+    pub fn delta_of(&mut self, document: &Document, changes: &ChangeSet, eye: DVec3) -> SceneDelta {
         if changes.is_empty() && self.environment.is_some() && self.extents.render_origin(eye) == self.origin
         {
             return SceneDelta::default();
         }
         let mut delta = SceneDelta { reason: changes.reason(), ..SceneDelta::default() };
-        self.note_extents(document, &changes);
+        self.note_extents(document, changes);
         let origin = self.extents.render_origin(eye);
         if origin != self.origin {
             self.origin = origin;
             delta.render_origin_changed = true;
         }
-        let reshaped = self.assets.reshape(document, &changes);
-        self.remove(document, &changes, &mut delta);
-        self.add(document, &changes, &mut delta);
+        let reshaped = self.assets.reshape(document, changes);
+        self.remove(document, changes, &mut delta);
+        self.add(document, changes, &mut delta);
         let whole: BTreeSet<Target> = changes.added.keys().chain(changes.instances.keys()).copied().collect();
-        self.move_instances(document, &changes, &whole, &mut delta);
-        self.show(document, &changes, &whole, &mut delta);
+        self.move_instances(document, changes, &whole, &mut delta);
+        self.show(document, changes, &whole, &mut delta);
         let posed: BTreeSet<Target> = changes.poses.iter().copied().chain(reshaped).collect();
         self.pose(document, posed.difference(&whole), &mut delta);
-        self.send_lights(document, &changes, &mut delta);
-        self.assets.send(document, &changes, &mut delta);
-        self.send_environment(document, &changes, &mut delta);
+        self.send_lights(document, changes, &mut delta);
+        self.assets.send(document, changes, &mut delta);
+        self.send_environment(document, changes, &mut delta);
         if delta.render_origin_changed && delta.reason.is_empty() {
             delta.reason = String::from("render origin");
         }

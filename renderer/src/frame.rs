@@ -34,7 +34,7 @@ pub(crate) fn record(
         view.bands.abandon();
     }
     if what == Invalidation::Everything {
-        view.history = None;
+        view.forget_light();
     }
     let plan = Plan::of(view, what, passes.radiance.denoises());
     let band = view.bands.next(view.extent()[1], plan.moved || plan.denoised);
@@ -101,14 +101,10 @@ pub(crate) fn record(
     if !band.last {
         return Ok(());
     }
-    if plan.denoised {
-        view.history = Some(filled);
-    }
     if !plan.moving {
         view.accumulation.advance();
     }
-    view.previous = Some(matrices);
-    view.frame_count += 1;
+    view.complete(matrices, plan.denoised.then_some(filled));
     Ok(())
 }
 
@@ -146,7 +142,9 @@ struct Plan {
 
 impl Plan {
     fn of(view: &View, what: Invalidation, denoises: bool) -> Self {
-        let moved = matches!(what, Invalidation::Camera | Invalidation::Scene);
+        // A view that was resized goes on with the light it had, as one that moves does.
+        let resized = what == Invalidation::Resize && view.history.is_some();
+        let moved = resized || matches!(what, Invalidation::Camera | Invalidation::Scene);
         let denoised = (moved || view.settings().denoise_stills) && denoises;
         let history = denoised && view.history.is_some() && view.previous.is_some();
         Self { moved, denoised, moving: moved && denoised, history }

@@ -11,7 +11,7 @@ use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse
 
 pub(crate) use bands::Bands;
 pub(crate) use camera::CameraMatrices;
-pub(crate) use targets::{History, Targets};
+pub(crate) use targets::{History, Past, Targets};
 
 use crate::accumulation::Accumulation;
 use crate::delta::{Camera, Invalidation, LightId};
@@ -44,6 +44,8 @@ pub struct View {
     pub(crate) selection: Vec<u32>,
     /// Targets of the present extent, with what they were made for; made at the first frame.
     pub(crate) targets: Option<((Needs, Pipeline), Targets)>,
+    /// The past of the targets that were let go with their size, and what those were made for.
+    retired: Option<((Needs, Pipeline), Past)>,
     pub(crate) accumulator: Option<Buffer>,
     pub(crate) counters: Counters,
     /// Camera of the last frame, without jitter.
@@ -105,6 +107,7 @@ impl View {
             statistics: Statistics::default(),
             selection: Vec::new(),
             targets: None,
+            retired: None,
             accumulator: None,
             counters: Counters { device: counter(Location::Device)?, host },
             previous: None,
@@ -229,7 +232,7 @@ impl View {
         let extent = self.full_extent.map(|side| side.div_ceil(self.divisor));
         if extent != self.extent {
             self.extent = extent;
-            self.drop_targets();
+            self.retire_targets();
             self.accumulator = None;
             self.accumulation.invalidate(Invalidation::Resize, reason);
         }
@@ -246,17 +249,44 @@ impl View {
         ready.map_or(self.last_window.as_ref(), |(_, targets)| targets.window.as_ref())
     }
 
-    /// Lets the targets go, and with them what they remember; the window's image stays until there is a new one.
-    fn drop_targets(&mut self) {
-        if let Some((_, targets)) = self.targets.take()
-            && self.displayed.take().is_some()
-        {
-            self.last_window = targets.window;
+    /// Lets the targets go and keeps what they remember; the window's image stays until there is a new one.
+    fn retire_targets(&mut self) {
+        if let Some((made_for, mut targets)) = self.targets.take() {
+            let window = targets.window.take();
+            if self.displayed.take().is_some() {
+                self.last_window = window;
+            }
+            self.retired = targets.into_past().map(|past| (made_for, past));
         }
-        self.previous = None;
-        self.history = None;
         self.seen = None;
         self.bands.abandon();
+    }
+
+    /// Lets the targets go, and with them what they remember.
+    fn drop_targets(&mut self) {
+        self.retire_targets();
+        self.previous = None;
+        self.forget_light();
+    }
+
+    /// The light of the frames before is of no use.
+    pub(crate) fn forget_light(&mut self) {
+        self.retired = None;
+        if let Some((_, targets)) = &mut self.targets {
+            targets.past = None;
+        }
+        self.history = None;
+    }
+
+    /// A frame is complete; `filled`: the history images that it filled, if it was denoised.
+    pub(crate) fn complete(&mut self, matrices: CameraMatrices, filled: Option<usize>) {
+        let resized = self.targets.as_mut().is_some_and(|(_, targets)| targets.past.take().is_some());
+        // A past of another size lasts for one frame.
+        if filled.is_some() || resized {
+            self.history = filled;
+        }
+        self.previous = Some(matrices);
+        self.frame_count += 1;
     }
 
     /// Notes that the display was made.
@@ -269,8 +299,15 @@ impl View {
     pub(crate) fn prepare_targets(&mut self, needs: Needs) -> Result<()> {
         let wanted = (needs, self.settings.pipeline);
         if self.targets.as_ref().is_none_or(|(made_for, _)| *made_for != wanted) {
+            let past = self.retired.take().filter(|(made_for, _)| *made_for == wanted);
+            let (history, previous) = (self.history, self.previous.take());
+            // Should the targets find no room, nothing refers to a past any more.
             self.drop_targets();
-            let targets = Targets::new(&self.device, self.extent, &needs, self.window)?;
+            let mut targets = Targets::new(&self.device, self.extent, &needs, self.window)?;
+            if let Some((_, past)) = past {
+                targets.past = Some(past);
+                (self.history, self.previous) = (history, previous);
+            }
             self.targets = Some((wanted, targets));
         }
         if let Some((_, targets)) = &mut self.targets {

@@ -1,18 +1,25 @@
-//! One device a process, one test at a time on it. Enters: nothing. Leaves: a `Session` that, at its end, fails the
+//! A few devices a process, one test at a time on each. Enters: nothing. Leaves: a `Session` that, at its end, fails the
 //! test when the validation layer has said anything.
 
 use std::cell::Cell;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use caustica_gpu::{Device, DeviceOptions, Frames, Instance, InstanceOptions, Requirements};
 
-struct Shared {
+/// A device with an instance of its own, so that messages belong to one test.
+struct Lent {
     instance: Arc<Instance>,
     device: Arc<Device>,
 }
 
-static SHARED: OnceLock<Shared> = OnceLock::new();
-static TURN: Mutex<()> = Mutex::new(());
+/// The devices of this process: a driver on the CPU compiles shaders on one core.
+struct Pool {
+    free: Vec<Lent>,
+    left_to_make: usize,
+}
+
+static POOL: Mutex<Pool> = Mutex::new(Pool { free: Vec::new(), left_to_make: 2 });
+static RETURNED: Condvar = Condvar::new();
 
 thread_local! {
     static HELD: Cell<bool> = const { Cell::new(false) };
@@ -26,7 +33,8 @@ pub struct Session {
     pub device: Arc<Device>,
     /// Frames in flight, of this session alone.
     pub frames: Frames,
-    _turn: MutexGuard<'static, ()>,
+    /// Last, so that all else of the test is gone when the next one begins.
+    _turn: Turn,
 }
 
 /// An instance with the validation layer and synchronisation validation.
@@ -55,22 +63,47 @@ pub fn device_options() -> DeviceOptions {
 /// Without a device that can run Caustica, without the validation layer, or when this test holds a session already.
 pub fn session() -> Session {
     assert!(!HELD.replace(true), "this test holds the device already: drop the first session");
-    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    let shared = SHARED.get_or_init(|| {
-        let instance = validated_instance();
-        let device = Device::new(&instance, &device_options()).expect("no device can run the tests");
-        eprintln!("device: {} ({})", device.name(), device.driver());
-        Shared { instance, device }
-    });
-    // What an earlier test of this process has said was that test's failure.
-    drop(shared.instance.take_messages());
-    let frames = Frames::new(&shared.device).expect("no command buffers");
-    Session {
-        instance: Arc::clone(&shared.instance),
-        device: Arc::clone(&shared.device),
-        frames,
-        _turn: turn,
+    let turn = Turn::take();
+    let Lent { instance, device } = &turn.0;
+    let (instance, device) = (Arc::clone(instance), Arc::clone(device));
+    // What an earlier test has said was that test's failure.
+    drop(instance.take_messages());
+    let frames = Frames::new(&device).expect("no command buffers");
+    Session { instance, device, frames, _turn: turn }
+}
+
+/// A device out of the pool, until it is dropped.
+struct Turn(Lent);
+
+impl Turn {
+    fn take() -> Self {
+        let mut pool = pool();
+        loop {
+            if let Some(lent) = pool.free.pop() {
+                return Self(lent);
+            }
+            if pool.left_to_make > 0 {
+                let instance = validated_instance();
+                let device = Device::new(&instance, &device_options()).expect("no device can run the tests");
+                eprintln!("device: {} ({})", device.name(), device.driver());
+                pool.left_to_make -= 1;
+                return Self(Lent { instance, device });
+            }
+            pool = RETURNED.wait(pool).unwrap_or_else(PoisonError::into_inner);
+        }
     }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        let lent = Lent { instance: Arc::clone(&self.0.instance), device: Arc::clone(&self.0.device) };
+        pool().free.push(lent);
+        RETURNED.notify_one();
+    }
+}
+
+fn pool() -> MutexGuard<'static, Pool> {
+    POOL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Fails when the validation layer has said anything.

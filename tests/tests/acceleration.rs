@@ -16,7 +16,7 @@
 //! | a first build that the background has finished | `first_builds_past_the_budget_come_later_while_frames_go_on` |
 //! | BLAS compacted, rebuilt for quality, or built to be traced fast, in the background | `an_edited_mesh_that_rests_is_built_to_be_traced_fast_and_compacted`, `what_refits_have_loosened_is_rebuilt_in_the_background_and_swapped_without_a_reset`, `what_was_begun_for_another_mesh_is_dropped` |
 //! | camera | `moving_one_camera_resets_that_view_alone` (i), `views_cost_no_structure` (r) |
-//! | size of the view | `every_other_event_resets_and_says_why` (i), `another_resolution_keeps_the_reason_of_what_moved` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
+//! | size of the view, adaptive resolution | `every_other_event_resets_and_says_why` (i), `another_resolution_keeps_the_reason_of_what_moved` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
 //! | pipeline, sampler, depth, rays, seed, jitter, any other setting | `every_other_event_resets_and_says_why` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
 //! | needs (auto or all) | `what_only_changes_the_display_keeps_the_samples` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
 //! | exposure, tone map, what is shown, selection | `what_only_changes_the_display_keeps_the_samples` (i), `what_is_no_event_keeps_the_samples` (r), `history_survives_moves_and_ends_with_its_targets` (i) |

@@ -239,13 +239,14 @@ fn history_survives_moves_and_ends_with_its_targets() {
         let display = studio.display();
         display.iter().map(|pixel| pixel[0]).sum::<f32>() / display.len() as f32
     };
-    let events: [(&str, bool, Event); 7] = [
+    let events: [(&str, bool, Event); 8] = [
         ("exposure", true, |studio, _| studio.set(|settings| settings.exposure_ev = 0.01)),
         ("selection", true, |studio, ball| {
             studio.renderer.select(studio.view, [ball].into_iter()).expect("a view");
         }),
         ("a move", true, |studio, ball| studio.frame(&moved(ball, -0.5))),
-        ("size", false, |studio, _| studio.view_mut().resize([32, 24])),
+        ("size", true, |studio, _| studio.view_mut().resize([32, 24])),
+        ("resolution", true, |studio, _| studio.view_mut().set_divisor(2)),
         ("needs", false, |studio, _| studio.set(|settings| settings.needs = NeedsMode::All)),
         ("settings", false, |studio, _| studio.set(|settings| settings.max_depth = 2)),
         ("render origin", false, |studio, _| {

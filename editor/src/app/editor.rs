@@ -183,8 +183,11 @@ impl Editor {
         if !stale || self.audit.is_some() || history.gesture_is_open() {
             return;
         }
-        // Vertices and texels are shared with the copy.
-        let document = self.session.document().clone();
+        let document = self.session.shared_document();
+        // The frame that is about to be drawn takes the changes in first.
+        if document.has_changes() && self.state.view.extent_px.is_some() {
+            return;
+        }
         match Job::start("audit", self.wake.clone(), move |_| audit(&document)) {
             Ok(job) => self.audit = Some((state, job)),
             Err(error) => tracing::warn!("the audit cannot be started: {error}"),

@@ -2,6 +2,7 @@
 //! figures. The document only has its changes drained here.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use caustica_renderer::Statistics;
 use caustica_renderer::gpu::{Acquired, Image, Recorder};
@@ -40,7 +41,7 @@ impl Session {
     /// the next delta sends the whole document.
     fn send_all_again(&mut self) -> anyhow::Result<()> {
         // Marked first: should this fail too, the next frame still sends everything.
-        self.document.mark_all_added("tried again");
+        Arc::make_mut(&mut self.document).mark_all_added("tried again");
         let mut recorder = self.frames.begin()?;
         let emptied = self.renderer.apply(&mut recorder, &std::mem::take(&mut self.sync).clear());
         self.frames.submit(recorder, None)?;
@@ -50,7 +51,9 @@ impl Session {
 
     fn record(&mut self, recorder: &mut Recorder, extent_px: [u32; 2]) -> anyhow::Result<()> {
         let mut lap = Lap::start();
-        let delta = self.sync.delta(&mut self.document, self.camera.world_from_camera.translation);
+        let eye = self.camera.world_from_camera.translation;
+        let changed = self.document.has_changes().then(|| Arc::make_mut(&mut self.document).drain_changes());
+        let delta = self.sync.delta_of(&self.document, &changed.unwrap_or_default(), eye);
         self.host_times.sync_ms = lap.ms();
         let selection_stale = self.selection_changed || !delta.instances.is_empty();
         if let Err(error) = self.renderer.apply(recorder, &delta) {

@@ -1,7 +1,10 @@
 //! What the renderer holds, compared with what the document says, and the way back to the order of a fresh load. Leaves:
 //! inventories by id, which know no slots and no addresses. It renders nothing.
 
+use std::sync::Arc;
+
 use caustica_renderer::{Inventory, Renderer, RendererOptions};
+use caustica_scene::Document;
 
 use super::Session;
 use crate::sync::Sync;
@@ -22,7 +25,7 @@ impl Session {
     /// # Errors
     /// When memory runs out or the device is lost.
     pub fn fresh_inventory(&mut self) -> anyhow::Result<Inventory> {
-        let mut document = self.document.clone();
+        let mut document = Document::clone(&self.document);
         document.mark_all_added("inventory");
         let delta = Sync::new().delta(&mut document, self.camera.world_from_camera.translation);
         let mut renderer = Renderer::new(&self.device, &mut self.frames, &RendererOptions::default())?;
@@ -39,7 +42,7 @@ impl Session {
     /// # Errors
     /// When the driver refuses; the next frame tries again.
     pub fn rebuild_scene(&mut self) -> anyhow::Result<()> {
-        self.document.mark_all_added("rebuilt acceleration structures");
+        Arc::make_mut(&mut self.document).mark_all_added("rebuilt acceleration structures");
         self.selection_changed = true;
         self.picture_revision += 1;
         self.empty_renderer().inspect_err(|_| self.resync = true)

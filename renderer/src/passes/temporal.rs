@@ -35,6 +35,10 @@ impl Temporal {
             .map(|image| Bind::Image(image.as_ref().unwrap_or(unused)));
         let (now, past) = (parity % 2, (parity + 1) % 2);
         let (filled, old) = (moving.filled, 1 - moving.filled);
+        let (normals, depths, before) = match &targets.past {
+            Some(past) => (&past.normal, &past.depth, &past.history),
+            None => (&targets.normal, &targets.depth, history),
+        };
         let binds = [
             ("gbuffer_id", Bind::Image(&targets.id)),
             ("gbuffer_normal", Bind::Image(&targets.normal[now])),
@@ -42,13 +46,13 @@ impl Temporal {
             ("direct_diffuse", diffuse),
             ("direct_specular", specular),
             ("reflected", Bind::Image(&targets.reflected)),
-            ("previous_depth", Bind::Image(&targets.depth[past])),
-            ("previous_normal", Bind::Image(&targets.normal[past])),
-            ("previous_diffuse", Bind::Image(&history.diffuse[old])),
-            ("previous_specular", Bind::Image(&history.specular[old])),
-            ("previous_reflected", Bind::Image(&history.reflected[old])),
-            ("previous_moments", Bind::Image(&history.moments[old])),
-            ("previous_image", Bind::Image(&history.image[old])),
+            ("previous_depth", Bind::Image(&depths[past])),
+            ("previous_normal", Bind::Image(&normals[past])),
+            ("previous_diffuse", Bind::Image(&before.diffuse[old])),
+            ("previous_specular", Bind::Image(&before.specular[old])),
+            ("previous_reflected", Bind::Image(&before.reflected[old])),
+            ("previous_moments", Bind::Image(&before.moments[old])),
+            ("previous_image", Bind::Image(&before.image[old])),
             ("history_diffuse", Bind::Image(&history.diffuse[filled])),
             ("history_specular", Bind::Image(&history.specular[filled])),
             ("history_reflected", Bind::Image(&history.reflected[filled])),

@@ -23,6 +23,13 @@ pub(crate) struct History {
     pub(crate) filtered: [[Image; 3]; 2],
 }
 
+/// The images of another size that hold the past of a view which was resized.
+pub(crate) struct Past {
+    pub(crate) normal: Vec<Image>,
+    pub(crate) depth: Vec<Image>,
+    pub(crate) history: History,
+}
+
 /// The images of a view.
 pub(crate) struct Targets {
     pub(crate) id: Image,
@@ -41,6 +48,8 @@ pub(crate) struct Targets {
     pub(crate) reflected: Image,
     pub(crate) reflected_tint: Image,
     pub(crate) history: Option<History>,
+    /// There until a frame of the new size is complete, in place of what `normal`, `depth` and `history` hold of the past.
+    pub(crate) past: Option<Past>,
     pub(crate) shaded: Image,
     /// One texel that is bound and never written unless the number of rays is shown and rays are traced.
     pub(crate) ray_depth: Image,
@@ -119,6 +128,7 @@ impl Targets {
                 Format::Rgba16Float,
             )?,
             history: history.transpose()?,
+            past: None,
             shaded: make("shaded", Format::Rgba32Float)?,
             ray_depth: or_one_texel(
                 needs.ray_depth && (needs.paths || needs.secondary_rays()),
@@ -129,6 +139,12 @@ impl Targets {
             display: make("display", Format::Rgba16Float)?,
             window: optional(window, "window", Format::Rgba16Float)?,
         })
+    }
+
+    /// What of these images a frame of another size can still use.
+    pub(crate) fn into_past(self) -> Option<Past> {
+        let Self { normal, depth, history, past, .. } = self;
+        past.or(history.map(|history| Past { normal, depth, history }))
     }
 
     /// Makes what is shown and needed for nothing else, and lets go what is not shown any more.

@@ -120,11 +120,16 @@ Neighbourhood gather(Frame frame, ivec2 at, uint instance, vec3 normal) {
     return n;
 }
 
+// Of the last frame, which may have had another size.
+ivec2 previous_extent() {
+    return textureSize(previous_normal, 0);
+}
+
 // Largest difference of reverse depth between the point seen now and a tap that shows the same surface. Perspective depth is near / distance, so
 // a footprint is a share of it; orthographic depth is affine.
 float depth_tolerance(Frame frame, float depth, float cosine) {
     float pixels = DEPTH_PIXELS + 1.5 / max(cosine, 0.05);
-    float size = pixels * 2.0 * frame.half_extent.y / float(frame.extent_px.y);
+    float size = pixels * 2.0 * frame.half_extent.y / float(min(int(frame.extent_px.y), previous_extent().y));
     if ((frame.flags & FRAME_ORTHOGRAPHIC) == 0u) {
         return min(size, 0.5) * depth;
     }
@@ -163,9 +168,12 @@ struct Taps {
     bool inside;
 };
 
+// `position`: in pixels of this frame.
 Taps taps_at(Frame frame, vec2 position) {
+    vec2 extent = vec2(previous_extent());
+    position *= extent / vec2(frame.extent_px);
     vec2 corner = floor(position - 0.5);
-    bool inside = all(greaterThanEqual(position, vec2(0.0))) && all(lessThanEqual(position, vec2(frame.extent_px)));
+    bool inside = all(greaterThanEqual(position, vec2(0.0))) && all(lessThanEqual(position, extent));
     return Taps(ivec2(corner), position - 0.5 - corner, inside);
 }
 
@@ -173,7 +181,7 @@ Taps taps_at(Frame frame, vec2 position) {
 float tap_weight(Frame frame, Taps taps, int i, vec3 normal, out ivec2 p) {
     ivec2 step_px = ivec2(i & 1, i >> 1);
     p = taps.corner + step_px;
-    if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, ivec2(frame.extent_px)))) {
+    if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, previous_extent()))) {
         return 0.0;
     }
     vec2 along = mix(1.0 - taps.share, taps.share, vec2(step_px));

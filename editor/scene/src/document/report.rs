@@ -6,6 +6,11 @@ use crate::ids::{NodeId, Target};
 use crate::prefab::Prefab;
 
 impl Document {
+    /// Whether [`Self::drain_changes`] would tell of anything.
+    pub fn has_changes(&self) -> bool {
+        !self.dirty.is_empty() || !self.dirty_parts.is_empty() || self.changes != ChangeSet::default()
+    }
+
     /// Brings transforms up to date and hands out what changed since the last call. The first call tells of
     /// everything as added. Work is proportional to the change.
     pub fn drain_changes(&mut self) -> ChangeSet {

@@ -118,6 +118,33 @@ fn a_soft_shadow_in_a_mirror_converges_while_the_camera_moves() {
     }
 }
 
+/// The first frame of another size is nearly as good as one that follows many of its own size, not as one without a past.
+#[test]
+fn a_view_of_another_size_goes_on_with_its_light() {
+    let (scene, _) = shadow_in_mirror();
+    let mut studio = Studio::of(EXTENT, settings(Pipeline::Hybrid), &scene.delta, passing_by(0.0));
+    for extent in [[64, 43], [128, 85]] {
+        studio.set(|settings| settings.denoise_stills = false);
+        studio.view_mut().resize(extent);
+        let reference = studio.mean(48).mean;
+        studio.set(|settings| settings.denoise_stills = true);
+        let mut error_after = |frames| {
+            studio.frames(frames);
+            rel_mse(&studio.read_frame(), &reference)
+        };
+        let (first, later) = (error_after(1), error_after(12));
+        studio.view_mut().resize(EXTENT);
+        studio.set(|settings| settings.seed += 1);
+        studio.frames(12);
+        studio.view_mut().resize(extent);
+        studio.frames(1);
+        let resized = rel_mse(&studio.read_frame(), &reference);
+        let what = format!("{extent:?}: relMSE {first:.4}, later {later:.4}, after another size {resized:.4}");
+        println!("{what}");
+        assert!(resized < 0.5 * (first + later), "{what}");
+    }
+}
+
 /// A board that was in front of the camera leaves nothing behind in the frame after it went, on the wall or in its image.
 #[test]
 fn what_was_hidden_has_no_past() {

@@ -372,13 +372,6 @@ impl Session {
         }
     }
 
-    /// Renders one pixel for `divisor` x `divisor` of the view, as while something moves on a slow device.
-    pub fn set_divisor(&mut self, divisor: u32) {
-        if let Ok(view) = self.renderer.view_mut(self.view) {
-            view.set_divisor(divisor);
-        }
-    }
-
     /// Starts the sample set at `offset`.
     ///
     /// # Errors

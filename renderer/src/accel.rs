@@ -95,7 +95,7 @@ impl Accel {
         dirty.addresses = !adopted.swapped.is_empty();
         self.build(recorder, tables, jobs, &mut dirty)?;
         self.surfaces.record(recorder, tables, &self.blases, &passes.blas_surface)?;
-        if adopted.appeared {
+        if !adopted.appeared.is_empty() {
             // An instance that waited for its BLAS becomes active: its record names a structure now.
             dirty.slots = (0..tables.instances.slot_count()).collect();
         }
@@ -108,7 +108,15 @@ impl Accel {
         }
         self.prepare_later(recorder, tables)?;
         self.note(tables, &adopted);
-        Ok(adopted.appeared)
+        Ok(adopted.appeared.iter().any(|number| self.is_met(tables, *number)))
+    }
+
+    /// Whether a ray can meet an instance of it.
+    fn is_met(&self, tables: &Tables, number: u32) -> bool {
+        self.blases.get(number).is_some_and(|blas| match blas.key.deforming {
+            Some(id) => tables.instances.is_met(id),
+            None => tables.instances.meets_mesh(blas.key.mesh),
+        })
     }
 
     /// Submits what the last frame prepared and takes into use what the background has finished.

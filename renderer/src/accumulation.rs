@@ -75,9 +75,15 @@ impl Accumulation {
         if what > self.pending {
             reason.clone_into(&mut self.reason);
         }
+        // Several events between two frames begin one picture.
+        self.resets += u64::from(self.pending == Invalidation::Nothing);
         self.pending = self.pending.max(what);
         self.samples = 0;
-        self.resets += 1;
+    }
+
+    /// What happened since the last frame.
+    pub(crate) fn pending(&self) -> Invalidation {
+        self.pending
     }
 
     /// What happened since the last frame; a new frame begins.

@@ -83,17 +83,12 @@ pub struct SceneDelta {
 impl SceneDelta {
     /// Whether applying this delta would do nothing.
     pub fn is_empty(&self) -> bool {
-        !self.names_more_than_instances()
-            && self.instances.is_empty()
+        self.instances.is_empty()
             && self.removed_instances.is_empty()
             && self.transforms.is_empty()
             && self.visibility.is_empty()
             && self.poses.is_empty()
-    }
-
-    /// Whether it holds more than instances, their transforms, visibility and poses.
-    pub(crate) fn names_more_than_instances(&self) -> bool {
-        !(self.meshes.is_empty()
+            && self.meshes.is_empty()
             && self.removed_meshes.is_empty()
             && self.textures.is_empty()
             && self.removed_textures.is_empty()
@@ -103,7 +98,7 @@ impl SceneDelta {
             && self.lights.is_empty()
             && self.removed_lights.is_empty()
             && self.environment.is_none()
-            && !self.render_origin_changed)
+            && !self.render_origin_changed
     }
 }
 
@@ -259,7 +254,7 @@ pub enum Invalidation {
     /// Exposure, tone map, overlay, selection, a swap between equal variants: samples are kept.
     #[default]
     Nothing,
-    /// Size of the view: starts again, history is dropped with the targets, whatever else happens.
+    /// Size of the view: starts again, history is resampled.
     Resize,
     /// The camera moved: this view starts again, history is reprojected by motion vectors.
     Camera,

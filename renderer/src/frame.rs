@@ -40,7 +40,7 @@ pub(crate) fn record(
     let band = view.bands.next(view.extent()[1], plan.moved || plan.denoised);
     recorder.set_tag(view.bands.tag(&band));
     let matrices = CameraMatrices::of(view.camera(), view.extent());
-    let constants = frame_constants(recorder, view, tables, &matrices, &plan)?;
+    let constants = frame_constants(view, tables, &matrices, &plan);
     let frame_address = recorder.stage_bytes(bytemuck::bytes_of(&constants))?;
     let scope = Scope {
         tables,
@@ -152,16 +152,15 @@ impl Plan {
 }
 
 fn frame_constants(
-    recorder: &mut Recorder,
     view: &mut View,
     tables: &Tables,
     matrices: &CameraMatrices,
     plan: &Plan,
-) -> Result<gpu_types::Frame> {
+) -> gpu_types::Frame {
     let extent = view.extent();
     let sample = view.accumulation.next_sample();
     let sample_index = if plan.moving { view.accumulation.next_moving_index() } else { sample.index };
-    let selection = selection_address(recorder, view)?;
+    let (selection, selection_count) = view.selection();
     let settings = view.settings();
     let jitter =
         if settings.jitter { view.sampling().jitter_px(settings.seed, sample_index) } else { Vec2::ZERO };
@@ -181,7 +180,7 @@ fn frame_constants(
     ] {
         flags |= if set { flag } else { 0 };
     }
-    Ok(gpu_types::Frame {
+    gpu_types::Frame {
         clip_from_render: matrices.jittered(jitter, extent).to_cols_array(),
         clip_from_render_unjittered: matrices.clip_from_render.to_cols_array(),
         previous_clip_from_render: previous.to_cols_array(),
@@ -214,22 +213,14 @@ fn frame_constants(
         block_start: u32::from(sample.opens_block),
         block_end: u32::from(sample.closes_block),
         accumulated: view.accumulation.samples().min(u64::from(u32::MAX)) as u32,
-        selection_count: view.selection.len() as u32 * 32,
+        selection_count,
         pad0: 0,
-    })
+    }
 }
 
 /// One pixel of each 2 x 2 traces reflected light in frames that are denoised.
 fn half_reflections(settings: &ViewSettings) -> bool {
     settings.reflection_rate == ReflectionRate::Half && settings.pipeline != Pipeline::Path
-}
-
-/// Stages the bit set of the outlined instances; 0 when nothing is selected.
-fn selection_address(recorder: &mut Recorder, view: &View) -> Result<u64> {
-    if view.selection.is_empty() {
-        return Ok(0);
-    }
-    Ok(recorder.stage_bytes(bytemuck::cast_slice(&view.selection))?)
 }
 
 /// Reads the counters that a finished frame of this slot has left.

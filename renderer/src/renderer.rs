@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse, Recorder};
-use glam::{Affine3A, Vec3};
+use glam::Vec3;
 
 use crate::accel::{Accel, AccelPolicy};
-use crate::delta::{Instance, InstanceId, Invalidation, SceneDelta};
+use crate::delta::{InstanceId, Invalidation, SceneDelta};
 use crate::error::{RendererError, Result};
 use crate::frame;
 use crate::gpu_types::AccumulatorPixel;
@@ -21,7 +21,7 @@ use crate::sampling::Sampling;
 use crate::settings::{Pipeline, Primary, ViewSettings};
 use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
 use crate::summary::Summary;
-use crate::tables::{Changed, Tables, is_degenerate};
+use crate::tables::{Changed, Tables, changes_image};
 use crate::view::{CameraMatrices, View, ViewId};
 
 /// How to make a renderer.
@@ -197,7 +197,7 @@ impl Renderer {
     /// Outlines these instances in a view. Keeps the samples.
     ///
     /// # Errors
-    /// When the view was removed.
+    /// When the view was removed, or memory runs out.
     pub fn select(&mut self, id: ViewId, instances: impl Iterator<Item = InstanceId>) -> Result<()> {
         let slots: Vec<u32> =
             instances.filter_map(|instance| self.tables.instances.slot_of(instance)).collect();
@@ -205,8 +205,7 @@ impl Renderer {
         for slot in slots {
             bits[slot as usize / 32] |= 1 << (slot % 32);
         }
-        self.view_mut(id)?.selection = bits;
-        Ok(())
+        self.view_mut(id)?.set_selection(&bits)
     }
 
     /// Records one frame of a view.
@@ -378,28 +377,6 @@ impl Renderer {
             (camera.translation.into(), camera.transform_vector3(at.extend(-1.0)).normalize())
         })
     }
-}
-
-/// Whether a delta changes what any ray can meet: hidden instances and those without size may come, move and go, and others stay where they are.
-fn changes_image(delta: &SceneDelta, tables: &Tables) -> bool {
-    let entry = |id: &InstanceId| tables.instances.slot_of(*id).and_then(|slot| tables.instances.get(slot));
-    let met = |id: &InstanceId| entry(id).is_some_and(|e| e.instance.visibility.shown && !e.degenerate);
-    let will_be_met = |new: &Instance| new.visibility.shown && !is_degenerate(&new.render_from_mesh);
-    let moves = |id: &InstanceId, map: &Affine3A| {
-        entry(id).is_none_or(|e| {
-            let solid = !(e.degenerate && is_degenerate(map));
-            solid && e.instance.visibility.shown && e.instance.render_from_mesh != *map
-        })
-    };
-    delta.names_more_than_instances()
-        || delta.instances.iter().any(|(id, new)| met(id) || will_be_met(new))
-        || delta.removed_instances.iter().any(met)
-        || delta.transforms.iter().any(|(id, map)| moves(id, map))
-        || delta.poses.iter().any(|(id, _)| entry(id).is_none_or(|e| e.instance.visibility.shown))
-        || delta
-            .visibility
-            .iter()
-            .any(|(id, v)| entry(id).is_none_or(|entry| entry.instance.visibility != *v))
 }
 
 fn read_image(device: &Arc<Device>, frames: &mut Frames, image: &Image) -> Result<Vec<u8>> {

@@ -40,8 +40,9 @@ pub struct View {
     extent: [u32; 2],
     pub(crate) accumulation: Accumulation,
     pub(crate) statistics: Statistics,
-    /// Instance slots that are outlined, as a bit set.
-    pub(crate) selection: Vec<u32>,
+    /// Instance slots that are outlined, as a bit set; made anew when they change.
+    selection: Option<Buffer>,
+    selection_revision: u64,
     /// Targets of the present extent, with what they were made for; made at the first frame.
     pub(crate) targets: Option<((Needs, Pipeline), Targets)>,
     /// The past of the targets that were let go with their size, and what those were made for.
@@ -73,7 +74,7 @@ pub(crate) struct Displayed {
     tone_map: ToneMap,
     show: Show,
     show_light: Option<LightId>,
-    selection: Vec<u32>,
+    selection_revision: u64,
 }
 
 /// The device's counters and their copies for the host, one a frame in flight.
@@ -105,7 +106,8 @@ impl View {
             extent: extent.map(|n| n.max(1)),
             accumulation: Accumulation::default(),
             statistics: Statistics::default(),
-            selection: Vec::new(),
+            selection: None,
+            selection_revision: 0,
             targets: None,
             retired: None,
             accumulator: None,
@@ -164,8 +166,31 @@ impl View {
             tone_map: self.settings.tone_map,
             show: self.settings.show,
             show_light: self.settings.show_light,
-            selection: self.selection.clone(),
+            selection_revision: self.selection_revision,
         }
+    }
+
+    /// Outlines the instance slots of a bit set.
+    pub(crate) fn set_selection(&mut self, bits: &[u32]) -> Result<()> {
+        let bytes: &[u8] = bytemuck::cast_slice(bits);
+        if self.selection.as_ref().map_or(&[][..], Buffer::mapped) == bytes {
+            return Ok(());
+        }
+        self.selection = None;
+        self.selection_revision += 1;
+        if !bytes.is_empty() {
+            let (usage, kind) = (BufferUse::General, MemoryUse::Tables);
+            let size = bytes.len() as u64;
+            let mut buffer = Buffer::new(&self.device, "selection", size, usage, Location::Upload, kind)?;
+            buffer.mapped_mut().copy_from_slice(bytes);
+            self.selection = Some(buffer);
+        }
+        Ok(())
+    }
+
+    /// Device address of the bit set of the outlined slots and how many slots it covers; 0 when nothing is outlined.
+    pub(crate) fn selection(&self) -> (u64, u32) {
+        self.selection.as_ref().map_or((0, 0), |bits| (bits.address(), bits.size() as u32 * 8))
     }
 
     /// Starts the sample set at `offset`. Resets the view.
@@ -181,6 +206,11 @@ impl View {
         if self.sampling() != before {
             self.accumulation.invalidate(Invalidation::Everything, "number of samples");
         }
+    }
+
+    /// Whether the next frame shows another place or another scene than the last.
+    pub fn is_about_to_move(&self) -> bool {
+        matches!(self.accumulation.pending(), Invalidation::Camera | Invalidation::Scene)
     }
 
     /// How random numbers are drawn.

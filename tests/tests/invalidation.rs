@@ -169,7 +169,7 @@ fn every_other_event_resets_and_says_why() {
     let mut expect_reset = |studio: &mut Studio, reason: &str| {
         let figures = studio.statistics();
         assert_eq!((figures.samples, figures.reset_reason.as_str()), (1, reason));
-        assert!(figures.resets > resets, "{reason}");
+        assert_eq!(figures.resets, resets + 1, "{reason}");
         resets = figures.resets;
         studio.frames(2);
         assert_eq!(studio.statistics().samples, 3);

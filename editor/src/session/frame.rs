@@ -20,6 +20,19 @@ impl Session {
     /// # Errors
     /// When a shader does not compile or fit, memory runs out, or the device is lost.
     pub fn begin_frame(&mut self, extent_px: [u32; 2]) -> anyhow::Result<Recorder> {
+        self.begin_frame_at(extent_px, |_| None)
+    }
+
+    /// Like [`Self::begin_frame`], with one pixel for `divisor` x `divisor` of the view, as while something moves on a slow device.
+    /// `divisor` is asked once it is known whether the view or what it shows has moved; `None`: as in the last frame.
+    ///
+    /// # Errors
+    /// As [`Self::begin_frame`].
+    pub fn begin_frame_at(
+        &mut self,
+        extent_px: [u32; 2],
+        divisor: impl FnOnce(bool) -> Option<u32>,
+    ) -> anyhow::Result<Recorder> {
         if std::mem::take(&mut self.resync) {
             self.send_all_again()?;
         }
@@ -27,7 +40,7 @@ impl Session {
         let mut recorder = self.frames.begin()?;
         self.renderer.note_times(self.view, &self.frames)?;
         self.host_times.begin_ms = lap.ms();
-        match self.record(&mut recorder, extent_px) {
+        match self.record(&mut recorder, extent_px, divisor) {
             Ok(()) => Ok(recorder),
             Err(error) => {
                 // Uploads and builds recorded until then count as done: they must reach the device.
@@ -49,7 +62,12 @@ impl Session {
         Ok(self.frames.trim()?)
     }
 
-    fn record(&mut self, recorder: &mut Recorder, extent_px: [u32; 2]) -> anyhow::Result<()> {
+    fn record(
+        &mut self,
+        recorder: &mut Recorder,
+        extent_px: [u32; 2],
+        divisor: impl FnOnce(bool) -> Option<u32>,
+    ) -> anyhow::Result<()> {
         let mut lap = Lap::start();
         let eye = self.camera.world_from_camera.translation;
         let changed = self.document.has_changes().then(|| Arc::make_mut(&mut self.document).drain_changes());
@@ -75,6 +93,9 @@ impl Session {
         let view = self.renderer.view_mut(self.view)?;
         view.resize(extent_px);
         view.set_camera(camera);
+        if let Some(divisor) = divisor(view.is_about_to_move()) {
+            view.set_divisor(divisor);
+        }
         self.renderer.render(recorder, self.view)?;
         self.tally.note(self.renderer.statistics(self.view)?);
         self.host_times.render_ms = lap.ms();

@@ -10,7 +10,7 @@ use caustica_gpu::{
 };
 
 use super::blas::{BlasTable, Built, Form};
-use super::build::{Job, SCRATCH_BUDGET, batch, job_of, scratch_of};
+use super::build::{Job, batch, job_of};
 use super::policy::{AccelPolicy, REST_FRAMES};
 use crate::error::{RendererError, Result};
 use crate::tables::{Snapshot, Tables};
@@ -44,8 +44,8 @@ enum Batch {
 pub(crate) struct Adopted {
     /// Numbers whose structure is another now.
     pub(crate) swapped: Vec<u32>,
-    /// Some of them had none before: the image changes.
-    pub(crate) appeared: bool,
+    /// Those of them that had none before.
+    pub(crate) appeared: Vec<u32>,
     /// Built from what has changed since: to be refitted in this frame.
     pub(crate) to_refit: Vec<u32>,
     /// How many were compacted.
@@ -132,7 +132,7 @@ impl Later {
         match &prepared {
             Batch::Builds(jobs, _) => {
                 let alignment = self.device.limits().scratch_alignment.max(1);
-                let size = scratch_of(jobs) + alignment;
+                let size = jobs.iter().map(Job::scratch).sum::<u64>() + alignment;
                 let (usage, kind) = (BufferUse::General, MemoryUse::AccelerationStructures);
                 let buffer =
                     Buffer::new(&self.device, "background scratch", size, usage, Location::Device, kind)?;
@@ -176,7 +176,7 @@ impl Later {
         let builds = [(first, fast), (loose, Form::Dynamic), (resting, fast)];
         let mut lacking = None;
         for (numbers, form) in builds {
-            let batch = self.builds(recorder, tables, blases, &numbers, form);
+            let batch = self.builds(recorder, tables, blases, (&numbers, form), policy);
             if self.take(batch, &mut lacking)? {
                 return Ok(());
             }
@@ -209,10 +209,11 @@ impl Later {
         recorder: &mut Recorder,
         tables: &Tables,
         blases: &BlasTable,
-        numbers: &[u32],
-        form: Form,
+        (numbers, form): (&[u32], Form),
+        policy: &AccelPolicy,
     ) -> Result<Option<Batch>> {
-        let (mut jobs, mut items, mut triangles) = (Vec::new(), Vec::new(), 0);
+        let (mut jobs, mut items) = (Vec::<Job>::new(), Vec::new());
+        let (mut triangles, mut scratch) = (0, 0);
         let mut lacking = None;
         for number in numbers {
             let Some(blas) = blases.get(*number) else { continue };
@@ -228,6 +229,11 @@ impl Later {
                 made => made?,
             };
             triangles += job.element_count();
+            scratch += job.scratch();
+            // A batch runs side by side: what does not fit is left to the next one.
+            if !jobs.is_empty() && (triangles > BATCH_TRIANGLES || scratch > policy.background_scratch) {
+                break;
+            }
             items.push(Item {
                 number: *number,
                 version: blas.version,
@@ -238,9 +244,6 @@ impl Later {
                 _snapshot: Some(snapshot),
             });
             jobs.push(job);
-            if triangles > BATCH_TRIANGLES || scratch_of(&jobs) >= SCRATCH_BUDGET {
-                break;
-            }
         }
         match lacking {
             Some(error) if jobs.is_empty() => Err(error),
@@ -293,7 +296,7 @@ fn adopt(item: Item, blases: &mut BlasTable, adopted: &mut Adopted) {
     if !current && !useful {
         return;
     }
-    adopted.appeared |= first;
+    adopted.appeared.extend(first.then_some(item.number));
     adopted.swapped.push(item.number);
     if !current {
         adopted.to_refit.push(item.number);

@@ -112,8 +112,8 @@ pub(crate) struct Blas {
     pub(crate) key: BlasKey,
     pub(crate) users: u32,
     pub(crate) built: Option<Built>,
-    /// It took the place of one that was built, as when a material lets light through: whatever its size it is built at once, for what was seen
-    /// must not vanish.
+    /// It takes the place of one that was built, as when a material lets light through or the mesh is another: whatever its size it is built at
+    /// once, for what was seen must not vanish.
     pub(crate) succeeds: bool,
     /// Frame of the last change of its geometry.
     pub(crate) changed_at: u64,
@@ -265,6 +265,7 @@ impl BlasTable {
         (blas.content, blas.compacted_size) = (content, None);
         if let Some(old) = blas.built.take() {
             self.bytes -= old.structure.size();
+            blas.succeeds = true;
         }
     }
 

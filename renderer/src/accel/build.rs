@@ -8,11 +8,9 @@ use caustica_gpu::{
 };
 
 use super::blas::{BlasInput, BlasKey, Form};
+use super::policy::SCRATCH_BUDGET;
 use crate::error::Result;
 use crate::tables::{Snapshot, Tables};
-
-/// Scratch memory that the builds of one batch may share, bytes.
-pub(crate) const SCRATCH_BUDGET: u64 = 64 << 20;
 
 /// Scratch memory for builds, kept between frames.
 pub(crate) struct Scratch {
@@ -86,6 +84,11 @@ impl Job {
         self.input.element_count()
     }
 
+    /// Bytes of scratch, a multiple of their alignment.
+    pub(crate) fn scratch(&self) -> u64 {
+        self.scratch
+    }
+
     fn build(&self, scratch: u64) -> AccelBuild<'_> {
         AccelBuild {
             target: &self.structure,
@@ -105,7 +108,7 @@ fn preference(form: Form) -> BuildPreference {
 }
 
 /// Scratch that the largest batch of `jobs` takes.
-pub(crate) fn scratch_of(jobs: &[Job]) -> u64 {
+fn scratch_of(jobs: &[Job]) -> u64 {
     let largest = jobs.iter().map(|job| job.scratch).max().unwrap_or(0);
     let total: u64 = jobs.iter().map(|job| job.scratch).sum();
     total.min(SCRATCH_BUDGET.max(largest))

@@ -72,9 +72,10 @@ impl Displacement {
         }
         let (low, high) = self.bounds.get_or_insert((before, before));
         (*low, *high) = (low.min(before).min(now), high.max(before).max(now));
-        let diagonal = low.distance(*high);
+        let diagonal = low.as_dvec3().distance(high.as_dvec3());
         let entry = self.moved.entry(slot).or_insert((before, 0.0));
-        let share = if diagonal > 0.0 { f64::from(entry.0.distance(now) / diagonal) } else { 0.0 };
+        let distance = entry.0.as_dvec3().distance(now.as_dvec3());
+        let share = if diagonal > 0.0 { distance / diagonal } else { 0.0 };
         self.sum += share - entry.1;
         entry.1 = share;
     }

@@ -15,6 +15,9 @@ pub(crate) const SMALLEST_DISPLACEMENT: f64 = 4.0;
 /// Scenes up to this many slots sort their instances anew at every build of the TLAS; larger ones when an eighth is new.
 pub(crate) const SORTED_SLOTS: u32 = 4096;
 
+/// Scratch memory that the builds of one batch may share, bytes.
+pub(crate) const SCRATCH_BUDGET: u64 = 64 << 20;
+
 /// Time that a frame of a window may spend on first builds, milliseconds.
 const FRAME_BUILDS_MS: f64 = 8.0;
 
@@ -29,13 +32,22 @@ pub struct AccelPolicy {
     pub compact: bool,
     /// Triangles that one frame may build for the first time; what goes past it is built in the background. `None`: all.
     pub frame_triangles: Option<u64>,
+    /// Bytes of scratch memory that the builds of one batch in the background may share; a single one may take more.
+    pub background_scratch: u64,
     /// The next frame waits for background work, so that a run does not depend on the clock.
     pub wait: bool,
 }
 
 impl Default for AccelPolicy {
     fn default() -> Self {
-        Self { refit: true, refit_tlas: true, compact: true, frame_triangles: None, wait: true }
+        Self {
+            refit: true,
+            refit_tlas: true,
+            compact: true,
+            frame_triangles: None,
+            background_scratch: SCRATCH_BUDGET,
+            wait: true,
+        }
     }
 }
 
@@ -49,6 +61,7 @@ impl AccelPolicy {
             compact: profile.compaction_pays(),
             frame_triangles: window.then(|| profile.triangles_in(FRAME_BUILDS_MS)),
             wait: !window,
+            ..Self::default()
         }
     }
 
@@ -83,7 +96,12 @@ pub(crate) fn change_of(policy: &AccelPolicy, dynamic: bool) -> Change {
 pub(crate) fn stretch(at_build: &[(Vec3, Vec3)], now: &[(Vec3, Vec3)]) -> f64 {
     let united = at_build.iter().zip(now).map(|(a, b)| surface(a.0.min(b.0), a.1.max(b.1)));
     let (grown, old): (f64, f64) = (united.sum(), at_build.iter().map(|b| surface(b.0, b.1)).sum());
-    if old > 0.0 { grown / old } else { 1.0 }
+    match (old > 0.0, grown > 0.0) {
+        (true, _) => grown / old,
+        // A tree around points is good for nothing else.
+        (false, true) => f64::INFINITY,
+        (false, false) => 1.0,
+    }
 }
 
 /// Surface of a box.
@@ -126,6 +144,8 @@ mod tests {
         assert_eq!(stretch(&[unit, unit], &[unit, moved(3.0)]), 2.0);
         assert!(stretch(&[unit, unit], &[unit, moved(0.1)]) < 1.1);
         assert_eq!(stretch(&[], &[]), 1.0);
+        let point = (Vec3::ZERO, Vec3::ZERO);
+        assert_eq!((stretch(&[point], &[point]), stretch(&[point], &[unit])), (1.0, f64::INFINITY));
     }
 
     #[test]

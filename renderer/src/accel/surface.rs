@@ -2,7 +2,7 @@
 //! now and when it was built, measured on the device and read two frames later. Triangles lie along a Morton curve, so that
 //! runs are like the leaves of a tree.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Weak};
 
 use caustica_gpu::{
@@ -16,7 +16,7 @@ use crate::gpu_types::{CLUSTER_TRIANGLES, Geometry, SurfaceJob};
 use crate::passes::BlasSurface;
 use crate::tables::Tables;
 
-/// One refit in so many is measured.
+/// One refit in so many is measured, and the last one before a rest.
 const MEASURE_EVERY: u32 = 8;
 
 /// What is known of one structure.
@@ -44,11 +44,22 @@ pub(crate) struct Surfaces {
     known: BTreeMap<u32, Known>,
     running: Vec<Measurement>,
     wanted: Vec<u32>,
+    /// Those that were refitted since they were last measured.
+    unmeasured: BTreeSet<u32>,
+    /// Those that were refitted in this frame.
+    refitted: BTreeSet<u32>,
 }
 
 impl Surfaces {
     pub(crate) fn new(device: &Arc<Device>) -> Self {
-        Self { device: Arc::clone(device), known: BTreeMap::new(), running: Vec::new(), wanted: Vec::new() }
+        Self {
+            device: Arc::clone(device),
+            known: BTreeMap::new(),
+            running: Vec::new(),
+            wanted: Vec::new(),
+            unmeasured: BTreeSet::new(),
+            refitted: BTreeSet::new(),
+        }
     }
 
     /// A BLAS was built or refitted in this frame.
@@ -57,16 +68,29 @@ impl Surfaces {
         match self.known.get_mut(&number).filter(|known| refit && same(known)) {
             Some(known) => {
                 known.refits += 1;
+                self.refitted.insert(number);
                 if known.refits.is_multiple_of(MEASURE_EVERY) {
                     self.wanted.push(number);
+                    self.unmeasured.remove(&number);
+                } else {
+                    self.unmeasured.insert(number);
                 }
             }
             None => {
                 let structure = Arc::downgrade(structure);
                 self.known.insert(number, Known { structure, refits: 0, at_build: None });
                 self.wanted.push(number);
+                self.unmeasured.remove(&number);
             }
         }
+    }
+
+    /// The last pose of what has come to rest is measured, too.
+    fn measure_rested(&mut self) {
+        let refitted = std::mem::take(&mut self.refitted);
+        let rested: Vec<u32> = self.unmeasured.difference(&refitted).copied().collect();
+        self.unmeasured.retain(|number| refitted.contains(number));
+        self.wanted.extend(rested);
     }
 
     /// Records the measurements that this frame asks for.
@@ -77,6 +101,7 @@ impl Surfaces {
         blases: &BlasTable,
         pass: &BlasSurface,
     ) -> Result<()> {
+        self.measure_rested();
         let first = self.running.len();
         let mut jobs = Vec::new();
         for number in std::mem::take(&mut self.wanted) {
@@ -144,5 +169,6 @@ impl Surfaces {
     /// Forgets what is no longer built.
     pub(crate) fn tidy(&mut self) {
         self.known.retain(|_, known| known.structure.strong_count() > 0);
+        self.unmeasured.retain(|number| self.known.contains_key(number));
     }
 }

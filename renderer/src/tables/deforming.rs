@@ -98,6 +98,11 @@ impl Deforming {
         Ok(())
     }
 
+    /// Whether an instance is in this pose already.
+    pub(crate) fn is_in_pose(&self, id: InstanceId, pose: &Pose) -> bool {
+        self.by_id.get(&id).is_some_and(|known| known.pose.as_ref() == Some(pose))
+    }
+
     /// Takes a new pose over. False: the instance does not deform.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! Instances: stable slots, transforms with their predecessors, and the material of every (instance, geometry).
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use glam::{Affine3A, Mat3A, Vec3A};
 use super::materials::Materials;
 use super::meshes::{Meshes, rows_of};
 use super::table::{Download, Table};
-use crate::delta::{Instance, InstanceId, MaterialId, Visibility};
+use crate::delta::{Instance, InstanceId, MaterialId, MeshId, Visibility};
 use crate::error::{RendererError, Result};
 use crate::gpu_types::{self, INSTANCE_MIRRORED, Rows};
 
@@ -21,6 +22,13 @@ pub(crate) struct Slot {
     pub(crate) degenerate: bool,
     material_base: u32,
     geometry_count: u32,
+}
+
+impl Slot {
+    /// Whether any ray can meet it.
+    fn is_met(&self) -> bool {
+        self.instance.visibility.shown && !self.degenerate
+    }
 }
 
 /// All instances, by slot.
@@ -35,6 +43,8 @@ pub(crate) struct Instances {
     moved_last_frame: BTreeSet<u32>,
     /// How many (instance, geometry) pairs have a material.
     uses: BTreeMap<MaterialId, u32>,
+    /// What rays can meet.
+    met: Met,
     /// Materials that came into use, or out of it, since they were last asked for.
     newly_used: BTreeSet<MaterialId>,
 }
@@ -50,6 +60,7 @@ impl Instances {
             free_ranges: BTreeMap::new(),
             moved_last_frame: BTreeSet::new(),
             uses: BTreeMap::new(),
+            met: Met::default(),
             newly_used: BTreeSet::new(),
         }
     }
@@ -84,6 +95,7 @@ impl Instances {
         }
         let material_base = match old {
             Some(old) => {
+                self.met.count(&old, -1);
                 self.release(&old.instance.materials);
                 if old.geometry_count == count {
                     old.material_base
@@ -113,8 +125,9 @@ impl Instances {
         }
         self.table.set(slot as usize, record);
         self.by_id.insert(id, slot);
-        self.slots[slot as usize] =
-            Some(Slot { id, instance: instance.clone(), degenerate, material_base, geometry_count: count });
+        let entry = Slot { id, instance: instance.clone(), degenerate, material_base, geometry_count: count };
+        self.met.count(&entry, 1);
+        self.slots[slot as usize] = Some(entry);
         Ok(slot)
     }
 
@@ -129,10 +142,12 @@ impl Instances {
     /// # Errors
     /// When the id is not in the table.
     pub(crate) fn set_transform(&mut self, id: InstanceId, transform: Affine3A) -> Result<(u32, bool)> {
-        let (slot, entry) = self.entry_mut(id)?;
-        let was_degenerate = std::mem::replace(&mut entry.degenerate, is_degenerate(&transform));
-        let degenerate = entry.degenerate;
-        entry.instance.render_from_mesh = transform;
+        let degenerate = is_degenerate(&transform);
+        let mut was_degenerate = degenerate;
+        let slot = self.change(id, |entry| {
+            was_degenerate = std::mem::replace(&mut entry.degenerate, degenerate);
+            entry.instance.render_from_mesh = transform;
+        })?;
         let mut record = self.table.get(slot as usize).copied().unwrap_or(bytemuck::Zeroable::zeroed());
         let (previous, old_flags) = (record.render_from_mesh, record.flags);
         place(&mut record, &transform, Some(previous));
@@ -146,22 +161,28 @@ impl Instances {
     /// # Errors
     /// When the id is not in the table.
     pub(crate) fn set_visibility(&mut self, id: InstanceId, visibility: Visibility) -> Result<u32> {
-        let (slot, entry) = self.entry_mut(id)?;
-        entry.instance.visibility = visibility;
-        Ok(slot)
+        self.change(id, |entry| entry.instance.visibility = visibility)
     }
 
-    fn entry_mut(&mut self, id: InstanceId) -> Result<(u32, &mut Slot)> {
+    fn change(&mut self, id: InstanceId, change: impl FnOnce(&mut Slot)) -> Result<u32> {
         let unknown = || RendererError::Unknown { what: "instance", id: format!("{}/{}", id.node, id.part) };
         let slot = *self.by_id.get(&id).ok_or_else(unknown)?;
         let entry = self.slots.get_mut(slot as usize).and_then(Option::as_mut).ok_or_else(unknown)?;
-        Ok((slot, entry))
+        let before = entry.is_met();
+        change(entry);
+        match (before, entry.is_met()) {
+            (false, true) => self.met.add(&entry.instance, 1),
+            (true, false) => self.met.add(&entry.instance, -1),
+            _ => {}
+        }
+        Ok(slot)
     }
 
     /// Takes an instance out. Returns the slot that it leaves.
     pub(crate) fn remove(&mut self, id: InstanceId) -> Option<u32> {
         let slot = self.by_id.remove(&id)?;
         if let Some(old) = self.slots[slot as usize].take() {
+            self.met.count(&old, -1);
             self.free_range(old.material_base, old.geometry_count);
             self.release(&old.instance.materials);
         }
@@ -228,6 +249,21 @@ impl Instances {
     /// Every material in use, once.
     pub(crate) fn materials_in_use(&self) -> impl Iterator<Item = MaterialId> {
         self.uses.keys().copied()
+    }
+
+    /// Whether any ray can meet an instance.
+    pub(crate) fn is_met(&self, id: InstanceId) -> bool {
+        self.slot_of(id).and_then(|slot| self.get(slot)).is_some_and(Slot::is_met)
+    }
+
+    /// Whether any ray can meet an instance of a mesh.
+    pub(crate) fn meets_mesh(&self, mesh: MeshId) -> bool {
+        self.met.meshes.contains_key(&mesh)
+    }
+
+    /// The materials that rays can meet.
+    pub(crate) fn met_materials(&self) -> &BTreeMap<MaterialId, i64> {
+        &self.met.materials
     }
 
     /// Whether some instance has a material.
@@ -299,6 +335,40 @@ impl Instances {
 
     fn free_range(&mut self, start: u32, count: u32) {
         self.free_ranges.entry(count).or_default().push(start);
+    }
+}
+
+/// How many instances that rays can meet have a mesh or a material; what none has is not listed.
+#[derive(Default)]
+struct Met {
+    meshes: BTreeMap<MeshId, i64>,
+    materials: BTreeMap<MaterialId, i64>,
+}
+
+impl Met {
+    fn count(&mut self, slot: &Slot, change: i64) {
+        if slot.is_met() {
+            self.add(&slot.instance, change);
+        }
+    }
+
+    fn add(&mut self, instance: &Instance, change: i64) {
+        add(&mut self.meshes, instance.mesh, change);
+        instance.materials.iter().for_each(|id| add(&mut self.materials, *id, change));
+    }
+}
+
+fn add<K: Ord>(counts: &mut BTreeMap<K, i64>, key: K, change: i64) {
+    match counts.entry(key) {
+        Entry::Occupied(mut entry) => {
+            *entry.get_mut() += change;
+            if *entry.get() == 0 {
+                entry.remove();
+            }
+        }
+        Entry::Vacant(entry) => {
+            entry.insert(change);
+        }
     }
 }
 

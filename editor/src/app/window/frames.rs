@@ -78,10 +78,6 @@ impl EditorWindow {
         };
         let key = self.key(full);
         let fresh = self.shown.as_ref() == Some(&key);
-        let moving =
-            self.shown.as_ref().is_some_and(|shown| shown.camera != key.camera || shown.state != key.state)
-                || self.editor.state.view.drag.is_some()
-                || self.editor.state.view.flying;
         let waits =
             fresh && self.had_input && self.is_slow() && self.last_picture.elapsed() < PICTURE_AT_LEAST_EVERY;
         let done = fresh && self.editor.session.is_done();
@@ -90,10 +86,14 @@ impl EditorWindow {
         }
         let config = &self.editor.state.config;
         let target_ms = config.adaptive.then_some(f64::from(config.target_frame_ms));
-        let divisor = self.adaptive.next(Instant::now(), moving, full, target_ms);
-        self.editor.state.view.divisor = divisor;
-        self.editor.session.set_divisor(divisor);
-        match self.editor.session.begin_frame(full) {
+        let view = &mut self.editor.state.view;
+        let held = view.drag.is_some() || view.flying;
+        let adaptive = &mut self.adaptive;
+        let begun = self.editor.session.begin_frame_at(full, |moved| {
+            view.divisor = adaptive.next(Instant::now(), moved || held, full, target_ms);
+            Some(view.divisor)
+        });
+        match begun {
             Ok(recorder) => {
                 self.broken = None;
                 self.shown = Some(key);

@@ -42,6 +42,8 @@ pub struct SessionOptions {
     pub extent: [u32; 2],
     /// The view is shown in a window.
     pub window: bool,
+    /// When acceleration structures are built, refitted and compacted; `None`: as suits the device.
+    pub acceleration: Option<AccelPolicy>,
 }
 
 /// What is seen through a pixel.
@@ -86,7 +88,8 @@ impl Session {
     pub fn new(device: &Arc<Device>, options: SessionOptions) -> anyhow::Result<Self> {
         let mut frames = Frames::new(device)?;
         let profile = DeviceProfile::in_force(device.name(), device.driver(), device.kind());
-        let acceleration = AccelPolicy::of(&profile.profile, options.window);
+        let acceleration =
+            options.acceleration.unwrap_or_else(|| AccelPolicy::of(&profile.profile, options.window));
         let renderer_options = RendererOptions {
             shaders: options.shaders,
             acceleration,

@@ -3,7 +3,7 @@
 //!
 //! | event | tests here, in `invalidation.rs` (i), `accel_edges.rs` (e), `deform.rs` (d), `churn/rows.rs` (r, through a session) |
 //! |---|---|
-//! | move, rotate, scale a node | `a_moved_instance_is_right_in_the_next_frame` (i), `a_tree_whose_instances_have_moved_far_is_built_anew`, `what_moves_or_hides_costs_its_records_and_a_refit` (r), `what_nobody_sees_moves_without_a_reset` (e) |
+//! | move, rotate, scale a node | `a_moved_instance_is_right_in_the_next_frame` (i), `a_tree_whose_instances_have_moved_far_is_built_anew`, `what_moves_or_hides_costs_its_records_and_a_refit` (r) |
 //! | hide or show; seen by the camera, casts shadows | `hiding_is_a_mask_and_a_refit`, `masks_tell_the_camera_from_shadows_and_mirrors`, `hiding_and_degenerating_come_back_unharmed` (i) |
 //! | assign a material | `a_material_that_is_given_builds_a_tree_only_where_rays_pass` (r) |
 //! | add or remove | `adding_builds_what_is_new_only_and_removing_nothing` (i), `who_takes_anothers_slot_has_the_tree_built_anew`, `an_instance_builds_what_it_does_not_share_and_its_end_builds_nothing` (r) |
@@ -18,6 +18,7 @@
 //! | camera | `moving_one_camera_resets_that_view_alone` (i), `views_cost_no_structure` (r) |
 //! | size of the view, adaptive resolution | `every_other_event_resets_and_says_why` (i), `another_resolution_keeps_the_reason_of_what_moved` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
 //! | pipeline, sampler, depth, rays, seed, jitter, any other setting | `every_other_event_resets_and_says_why` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
+//! | any of these of what no ray can meet (hidden, without size), and of meshes, materials and textures that nothing else uses (`tables/met.rs`) | `what_nobody_sees_moves_without_a_reset` (e), `assets_of_what_nobody_sees_change_without_a_reset` (e) |
 //! | needs (auto or all) | `what_only_changes_the_display_keeps_the_samples` (i), `history_survives_moves_and_ends_with_its_targets` (i) |
 //! | exposure, tone map, what is shown, selection | `what_only_changes_the_display_keeps_the_samples` (i), `what_is_no_event_keeps_the_samples` (r), `history_survives_moves_and_ends_with_its_targets` (i) |
 //!

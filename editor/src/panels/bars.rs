@@ -1,7 +1,7 @@
 //! Menu bar, tool bar and status bar. Enters: session and memory. Leaves: actions and settings of the view.
 
 use caustica_renderer::{Show, TlasWork};
-use caustica_scene::PrefabId;
+use caustica_scene::{Finding, PrefabId, Severity};
 use egui::{Button, MenuBar, RichText, Ui};
 use egui_phosphor::regular as icon;
 
@@ -270,49 +270,66 @@ fn tool_button(cx: &mut Cx<'_>, ui: &mut Ui, command: &Command) {
 
 /// The status bar.
 pub fn status(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.horizontal_centered(|ui| {
+    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
         ui.spacing_mut().item_spacing.x = 12.0;
-        let mono = |text: String| RichText::new(text).monospace().size(11.5);
-        saved(cx, ui);
-        ui.separator();
-        let statistics = cx.session.statistics();
-        let reason = if statistics.reset_reason.is_empty() { "\u{2014}" } else { &statistics.reset_reason };
-        ui.label(mono(format!("reset: {reason}"))).on_hover_text("Why the picture was last begun anew");
-        ui.separator();
-        let accel = &statistics.acceleration;
-        let text = format!(
-            "BLAS {} ({} built, {} refit, {} pending) \u{b7} TLAS {}",
-            accel.blas_count,
-            accel.blas_built,
-            accel.blas_refit,
-            accel.blas_pending,
-            tlas_word(accel.tlas)
-        );
-        let tip = "Acceleration structures: a BLAS for each mesh and each object that deforms, one TLAS over all \
-                   instances; in brackets what the last frame did. Click for all figures";
-        if ui.add(egui::Label::new(mono(text)).sense(egui::Sense::click())).on_hover_text(tip).clicked() {
-            cx.state.actions.push(Action::ShowTab(Tab::Acceleration));
-        }
-        acceleration::pending(cx, ui);
-        ui.separator();
-        memory(cx, ui);
-        if statistics.non_finite > 0 {
-            let text = mono(format!("{} {} non-finite", icon::WARNING, statistics.non_finite));
-            ui.label(text.color(ui.visuals().warn_fg_color)).on_hover_text("Samples that were no finite numbers; they were dropped");
-        }
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.spacing_mut().item_spacing.x = 12.0;
-            let ms = super::milliseconds(cx.session.device_ms(), 2);
-            ui.label(mono(format!("{ms:>7} ms"))).on_hover_text("All passes of a frame on the device");
-            ui.label(mono(format!("{:6} samples", statistics.samples))).on_hover_text("Samples in each pixel of the picture");
-            if let Some(audit) = &cx.state.health {
-                let problems = audit.findings.iter().filter(|f| f.severity != caustica_scene::Severity::Info).count();
-                if problems > 0 && ui.link(mono(format!("problems {problems}"))).on_hover_text("Open the Health panel").clicked() {
-                    cx.state.actions.push(Action::ShowTab(Tab::Health));
-                }
-            }
+        status_figures(cx, ui);
+        // What the window has no room for is cut off.
+        ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+            ui.set_clip_rect(ui.clip_rect().intersect(ui.max_rect()));
+            status_words(cx, ui);
         });
     });
+}
+
+fn mono(text: String) -> RichText {
+    RichText::new(text).monospace().size(11.5)
+}
+
+/// On the left.
+fn status_words(cx: &mut Cx<'_>, ui: &mut Ui) {
+    saved(cx, ui);
+    ui.separator();
+    let statistics = cx.session.statistics();
+    let reason = if statistics.reset_reason.is_empty() { "\u{2014}" } else { &statistics.reset_reason };
+    ui.label(mono(format!("reset: {reason}"))).on_hover_text("Why the picture was last begun anew");
+    ui.separator();
+    let accel = &statistics.acceleration;
+    let text = format!(
+        "BLAS {} ({} built, {} refit, {} pending) \u{b7} TLAS {}",
+        accel.blas_count,
+        accel.blas_built,
+        accel.blas_refit,
+        accel.blas_pending,
+        tlas_word(accel.tlas)
+    );
+    let tip = "Acceleration structures: a BLAS for each mesh and each object that deforms, one TLAS over all \
+               instances; in brackets what the last frame did. Click for all figures";
+    if ui.add(egui::Label::new(mono(text)).sense(egui::Sense::click())).on_hover_text(tip).clicked() {
+        cx.state.actions.push(Action::ShowTab(Tab::Acceleration));
+    }
+    acceleration::pending(cx, ui);
+    ui.separator();
+    memory(cx, ui);
+    if statistics.non_finite > 0 {
+        let text = mono(format!("{} {} non-finite", icon::WARNING, statistics.non_finite));
+        let tip = "Samples that were no finite numbers; they were dropped";
+        ui.label(text.color(ui.visuals().warn_fg_color)).on_hover_text(tip);
+    }
+}
+
+/// On the right, from there to the left.
+fn status_figures(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let ms = super::milliseconds(cx.session.device_ms(), 2);
+    ui.label(mono(format!("{ms:>7} ms"))).on_hover_text("All passes of a frame on the device");
+    let samples = mono(format!("{:6} samples", cx.session.statistics().samples));
+    ui.label(samples).on_hover_text("Samples in each pixel of the picture");
+    let Some(audit) = &cx.state.health else { return };
+    let is_problem = |finding: &&Finding| finding.severity != Severity::Info;
+    let problems = audit.findings.iter().filter(is_problem).count();
+    let link = mono(format!("problems {problems}"));
+    if problems > 0 && ui.link(link).on_hover_text("Open the Health panel").clicked() {
+        cx.state.actions.push(Action::ShowTab(Tab::Health));
+    }
 }
 
 fn tlas_word(work: TlasWork) -> &'static str {

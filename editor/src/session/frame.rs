@@ -156,6 +156,11 @@ impl Session {
         self.is_converged() && !self.renderer.is_busy()
     }
 
+    /// Whether acceleration structures are left to later frames.
+    pub fn builds_in_background(&self) -> bool {
+        self.renderer.is_busy()
+    }
+
     /// What is seen through a pixel of the last frame. Waits for the device.
     ///
     /// # Errors

@@ -73,7 +73,7 @@ fn spoilt() -> [(&'static str, Local); 4] {
 fn a_spoilt_instance_of_two_hundred_is_lost_alone() {
     let gpu = gpu::session();
     let folder = tempfile::tempdir().expect("a folder");
-    let mut session = new_session(&gpu, NeedsMode::Auto);
+    let mut session = new_session(&gpu, NeedsMode::Auto, None);
     furnish(&mut session, &model::write(folder.path()));
     let crowd = crowd(&mut session);
     for pipeline in [Pipeline::Hybrid, Pipeline::Raytraced, Pipeline::Raster] {
@@ -118,7 +118,7 @@ fn beyond() -> [(&'static str, DAffine3); 4] {
 fn a_spoilt_primitive_is_lost_alone() {
     let gpu = gpu::session();
     let folder = tempfile::tempdir().expect("a folder");
-    let mut session = new_session(&gpu, NeedsMode::Auto);
+    let mut session = new_session(&gpu, NeedsMode::Auto, None);
     furnish(&mut session, &model::write(folder.path()));
     crowd(&mut session);
     let mesh = session.document().meshes().find(|(_, mesh)| mesh.name == "Pair").expect("the pair").0;

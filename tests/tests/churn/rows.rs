@@ -52,7 +52,7 @@ fn camera(x: f64) -> ViewCamera {
 impl Bench {
     fn new(gpu: &gpu::Session) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut session = new_session(gpu, NeedsMode::Auto);
+        let mut session = new_session(gpu, NeedsMode::Auto, None);
         furnish(&mut session, &model::write(folder.path()));
         // Built, compacted and at rest.
         for _ in 0..8 {

@@ -30,8 +30,12 @@ fn open(session: &mut Session, file: &Path) {
 }
 
 fn new_session(gpu: &gpu::Session) -> Session {
-    let options =
-        SessionOptions { shaders: shaders_under_test(), settings: settings(), extent: EXTENT, window: false };
+    let options = SessionOptions {
+        shaders: shaders_under_test(),
+        settings: settings(),
+        extent: EXTENT,
+        ..SessionOptions::default()
+    };
     Session::new(&gpu.device, options).expect("a session")
 }
 

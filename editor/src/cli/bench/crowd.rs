@@ -67,6 +67,9 @@ impl Crowd {
         }
         crowd.document_s = lap.ms() / 1e3;
         crowd.look_at_probe();
+        // As in the editor, where what is moved is selected: the last node, whose slot is the highest.
+        let last = crowd.nodes.last().map(|node| Target::node(*node));
+        crowd.session.set_selection(&last.into_iter().collect());
         crowd.frame()?;
         crowd.first_frame_s = lap.ms() / 1e3;
         Ok(crowd)

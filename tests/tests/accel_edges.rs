@@ -1,5 +1,6 @@
 //! Acceleration structures where little is left: the last instance, an instance that nobody sees, a mesh that is edited before
 //! it was ever built, everything exchanged in one frame, builds past their budgets, trees around a point.
+#![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
 use std::sync::Arc;
 

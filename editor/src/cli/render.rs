@@ -231,6 +231,7 @@ fn summary(
         "acceleration_structures": statistics.acceleration,
         "memory_bytes": memory,
         "non_finite_samples": statistics.non_finite,
+        "shadow_rays_of_last_frame": (statistics.shadow_rays > 0).then_some(statistics.shadow_rays),
         "reset_reason": statistics.reset_reason,
         "left_out": statistics.left_out,
     })

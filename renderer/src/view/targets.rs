@@ -47,6 +47,9 @@ pub(crate) struct Targets {
     /// What rays bring, to be denoised; one texel when nothing is.
     pub(crate) reflected: Image,
     pub(crate) reflected_tint: Image,
+    /// What shadow rays met, and for the next frame: two taken in turns as those of the history; one texel when none is left
+    /// out.
+    pub(crate) shadows: [Image; 2],
     pub(crate) history: Option<History>,
     /// There until a frame of the new size is complete, in place of what `normal`, `depth` and `history` hold of the past.
     pub(crate) past: Option<Past>,
@@ -104,6 +107,7 @@ impl Targets {
                 filtered: [filtered()?, filtered()?],
             })
         });
+        let shadows = || or_one_texel(needs.known_shadows, "shadows", Format::R32Uint);
         let optional = |wanted: bool, name: &str, format| wanted.then(|| make(name, format)).transpose();
         Ok(Self {
             id: make("gbuffer_id", Format::Rgba32Uint)?,
@@ -127,6 +131,7 @@ impl Targets {
                 "reflected_tint",
                 Format::Rgba16Float,
             )?,
+            shadows: [shadows()?, shadows()?],
             history: history.transpose()?,
             past: None,
             shaded: make("shaded", Format::Rgba32Float)?,

@@ -56,13 +56,13 @@ fn one_sample_gains(pipeline: Pipeline, samples: u64, gains: [f64; 2], bias_max:
 
 #[test]
 fn denoised_frames_of_hybrid_are_nearer_to_the_mean() {
-    one_sample_gains(Pipeline::Hybrid, 48, [1.7, 4.0], 0.03);
+    one_sample_gains(Pipeline::Hybrid, 48, [1.7, 4.0], 0.01);
 }
 
 #[test]
 fn denoised_frames_of_paths_are_nearer_to_the_mean() {
-    // Lone bright pixels lose their light: as much as 7 % of all there is in the first frame.
-    one_sample_gains(Pipeline::Path, 64, [4.0, 4.0], 0.1);
+    // Most of the light comes by few samples, of which the first frame has one a pixel.
+    one_sample_gains(Pipeline::Path, 64, [4.0, 4.0], 0.04);
 }
 
 /// A floor under a large lamp with a board over it, seen by a mirror that fills the image: its soft shadow is

@@ -21,6 +21,8 @@ pub(crate) struct History {
     pub(crate) moments: [Image; 2],
     /// Diffuse, specular and reflected light in turns between the steps of the filter; one texel as in the four above.
     pub(crate) filtered: [[Image; 3]; 2],
+    /// What the steps of the filter compare these by, in turns as well; one texel when nothing is filtered over space.
+    pub(crate) guide: [Image; 2],
 }
 
 /// The images of another size that hold the past of a view which was resized.
@@ -105,6 +107,7 @@ impl Targets {
                 image: pair(brought, "history_image")?,
                 moments: pair(needs.spatial, "history_moments")?,
                 filtered: [filtered()?, filtered()?],
+                guide: pair(needs.spatial, "guide")?,
             })
         });
         let shadows = || or_one_texel(needs.known_shadows, "shadows", Format::R32Uint);

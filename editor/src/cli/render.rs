@@ -15,6 +15,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 pub(super) use args::RenderArgs;
+pub(super) use args::parse_size;
 use args::settings_of;
 
 use super::DeviceArgs;

@@ -163,7 +163,7 @@ enum SamplerArg {
     BlueNoise,
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+pub(in crate::cli) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));
     match [side(width)?, side(height)?] {

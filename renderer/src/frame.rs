@@ -8,7 +8,7 @@ use crate::delta::Invalidation;
 use crate::error::Result;
 use crate::gpu_types::{
     self, FRAME_DENOISED, FRAME_HALF_REFLECTIONS, FRAME_HISTORY, FRAME_MOVING, FRAME_OPAQUE_GLASS,
-    FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND, FRAME_STEADY,
+    FRAME_ORTHOGRAPHIC, FRAME_PATHS_BEND, FRAME_SHADOWS_KNOWN, FRAME_STEADY, FrameCounters,
 };
 use crate::needs::Needs;
 use crate::passes::{Moving, PassSet, Radiance, Scope, Shown};
@@ -50,8 +50,11 @@ pub(crate) fn record(
         extent: view.extent(),
         rows: band.rows.clone(),
     };
-    if constants.accumulated == 0 && band.first {
-        recorder.clear_buffer(&view.counters.device);
+    if band.first {
+        // Dropped samples are counted since the last reset, rays in each frame anew.
+        let anew = std::mem::offset_of!(FrameCounters, shadow_rays) as u64;
+        let from = if constants.accumulated == 0 { 0 } else { anew };
+        recorder.clear_buffer(&view.counters.device, from..view.counters.device.size());
     }
     let parity = (view.frame_count % 2) as usize;
     view.seen = Some(parity);
@@ -93,7 +96,8 @@ pub(crate) fn record(
         displayed = Some(display);
     }
     let counters = &view.counters;
-    recorder.copy_buffer(&counters.device, &counters.host[recorder.slot() % counters.host.len()], 16)?;
+    let host = &counters.host[recorder.slot() % counters.host.len()];
+    recorder.copy_buffer(&counters.device, host, counters.device.size())?;
 
     if let Some(display) = displayed {
         view.set_displayed(display);
@@ -138,6 +142,8 @@ struct Plan {
     moving: bool,
     /// The past belongs to the last frame and may be reprojected.
     history: bool,
+    /// What shadow rays met in the last frame they would meet now.
+    shadows_known: bool,
 }
 
 impl Plan {
@@ -147,7 +153,9 @@ impl Plan {
         let moved = resized || matches!(what, Invalidation::Camera | Invalidation::Scene);
         let denoised = (moved || view.settings().denoise_stills) && denoises;
         let history = denoised && view.history.is_some() && view.previous.is_some();
-        Self { moved, denoised, moving: moved && denoised, history }
+        // Whatever moves casts its shadow elsewhere; pixels of another size have nothing to look up.
+        let shadows_known = history && matches!(what, Invalidation::Camera | Invalidation::Nothing);
+        Self { moved, denoised, moving: moved && denoised, history, shadows_known }
     }
 }
 
@@ -172,6 +180,7 @@ fn frame_constants(
         (matrices.orthographic, FRAME_ORTHOGRAPHIC),
         (plan.denoised, FRAME_DENOISED),
         (plan.denoised && half_reflections(settings), FRAME_HALF_REFLECTIONS),
+        (plan.shadows_known, FRAME_SHADOWS_KNOWN),
         (plan.moving, FRAME_MOVING),
         (plan.history, FRAME_HISTORY),
         (settings.opaque_glass_shadows, FRAME_OPAQUE_GLASS),
@@ -226,7 +235,9 @@ fn half_reflections(settings: &ViewSettings) -> bool {
 /// Reads the counters that a finished frame of this slot has left.
 pub(crate) fn read_counters(view: &mut View, slot: usize) {
     let host = &view.counters.host[slot % view.counters.host.len()];
-    if let Some(word) = host.mapped().first_chunk::<4>() {
-        view.statistics.non_finite = u64::from(u32::from_ne_bytes(*word));
+    if let Some(bytes) = host.mapped().get(..size_of::<FrameCounters>()) {
+        let counters: FrameCounters = bytemuck::pod_read_unaligned(bytes);
+        view.statistics.non_finite = u64::from(counters.non_finite);
+        view.statistics.shadow_rays = u64::from(counters.shadow_rays);
     }
 }

@@ -283,9 +283,11 @@ twins! {
     }
 
     /// What the device counts in a frame.
-    struct FrameCounters, size 4 {
+    struct FrameCounters, size 8 {
         /// Samples dropped because a channel was not finite.
         0 non_finite: u32,
+        /// Rays that pass shadow traced in this frame, where it leaves some out.
+        4 shadow_rays: u32,
     }
 
     /// One stream of one accumulated pixel; w counts the finite samples.

@@ -31,6 +31,8 @@ pub use measure::{
 pub use needs::{Needs, SceneSummary, SurfaceSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
 pub use sampling::Sampling;
-pub use settings::{NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Show, ToneMap, ViewSettings};
+pub use settings::{
+    NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, ShadowRate, Show, ToneMap, ViewSettings,
+};
 pub use tables::sheen_albedo_table;
 pub use view::{View, ViewId};

@@ -7,7 +7,7 @@ use caustica_gpu::Specialization;
 
 use crate::delta::{Material, MaterialId, ShadingMode};
 use crate::measure::LeftOut;
-use crate::settings::{NeedsMode, Pipeline, Primary, ReflectionRate, Show, ViewSettings};
+use crate::settings::{NeedsMode, Pipeline, Primary, ReflectionRate, ShadowRate, Show, ViewSettings};
 use crate::tables::{emits, has_alpha, is_opaque, transmits};
 
 /// What a scene holds, as far as it decides what is needed.
@@ -195,6 +195,8 @@ pub struct Needs {
     pub lobes: bool,
     /// Paths carry the light, not the passes for shadow and shading.
     pub paths: bool,
+    /// Shadow rays are left out where the frames before tell what they meet. A choice of the view, as the next one.
+    pub known_shadows: bool,
     /// The number of rays behind a surface is shown. What is shown is no need of the scene: false with `NeedsMode::All`
     /// too, unless it is.
     pub ray_depth: bool,
@@ -238,6 +240,10 @@ impl Needs {
                 || settings.pipeline == Pipeline::Raytraced
                 || (rays && (scene.shapes || settings.primary == Primary::Rays)),
             paths,
+            known_shadows: settings.shadow_rate == ShadowRate::Penumbra
+                && temporal
+                && !paths
+                && (all || (noisy && scene.lights > 0)),
             // Not with `all` alone: reading the textures of lobes takes lavapipe a minute to compile, in every general variant.
             lobes: surfaces.lobes,
             ray_depth: settings.show == Show::RayDepth,
@@ -277,6 +283,7 @@ impl Needs {
             self.lobes,
             self.ray_depth,
             self.temporal,
+            self.known_shadows,
         ];
         Specialization {
             values: values.iter().enumerate().map(|(id, v)| (id as u32, u32::from(*v))).collect(),
@@ -305,7 +312,7 @@ impl Needs {
                 switched_off
             }
         };
-        let list: [(bool, &str, &str); 18] = [
+        let list: [(bool, &str, &str); 19] = [
             (
                 rays && self.direct_light(),
                 "shadow rays",
@@ -328,6 +335,15 @@ impl Needs {
                 settings.reflection_rate == ReflectionRate::Full || self.halves_reflections(),
                 "reflections at half the rate",
                 if self.paths { "a path carries all light" } else { "no reflected light is denoised" },
+            ),
+            (
+                settings.shadow_rate == ShadowRate::Full || self.known_shadows,
+                "shadow rays in penumbrae alone",
+                match () {
+                    () if self.paths => "a path carries all light",
+                    () if !self.lights => "the scene has no punctual light",
+                    () => why_not_denoised("no light is denoised over time"),
+                },
             ),
             (self.emission, "emissive target", "no surface emits"),
             (self.motion, "motion vectors", "nothing is denoised over time"),
@@ -446,9 +462,25 @@ mod tests {
     }
 
     #[test]
+    fn shadows_are_remembered_of_punctual_lights_in_denoised_light() {
+        let settings = ViewSettings { shadow_rate: ShadowRate::Penumbra, ..ViewSettings::default() };
+        let soft = SceneSummary { lights: 1, all_lights_hard: false, ..summary(&[rough()]) };
+        let known = |scene: &SceneSummary, settings: &ViewSettings| Needs::of(scene, settings).known_shadows;
+        assert!(known(&soft, &settings) && !known(&soft, &ViewSettings::default()));
+        assert!(!known(&SceneSummary { all_lights_hard: true, ..soft }, &settings));
+        assert!(!known(&SceneSummary { lights: 0, environment: true, ..soft }, &settings));
+        assert!(!known(&soft, &ViewSettings { pipeline: Pipeline::Path, ..settings.clone() }));
+        assert!(!known(&soft, &ViewSettings { temporal: false, ..settings }));
+    }
+
+    #[test]
     fn all_means_all() {
-        let settings =
-            ViewSettings { needs: NeedsMode::All, show: Show::RayDepth, ..ViewSettings::default() };
+        let settings = ViewSettings {
+            needs: NeedsMode::All,
+            show: Show::RayDepth,
+            shadow_rate: ShadowRate::Penumbra,
+            ..ViewSettings::default()
+        };
         let coat = crate::delta::Lobes { clearcoat: 1.0, ..Default::default() };
         let coated = Material { lobes: Some(Box::new(coat)), ..rough() };
         let needs = Needs::of(&summary(&[coated]), &settings);

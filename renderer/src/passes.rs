@@ -171,6 +171,11 @@ impl Scope<'_> {
         Ok(())
     }
 
+    /// The same with all rows.
+    fn whole(&self) -> Self {
+        Self { rows: 0..self.extent[1], ..*self }
+    }
+
     /// Launches one ray generation shader a pixel of `rows`.
     fn rays(
         &self,
@@ -178,15 +183,16 @@ impl Scope<'_> {
         label: &str,
         pipeline: &RayTracingPipeline,
         binds: &[(&str, Bind<'_>)],
-        rows: Range<u32>,
+        uses: &[Use<'_>],
         argument0: u32,
     ) -> Result<()> {
-        let mut uses = self.tables.uses(Stage::RayTracing).to_vec();
-        uses.extend(self.accel.uses());
-        let push = self.push(argument0, rows.start);
-        let size = [self.extent[0], rows.end - rows.start];
+        let mut all = uses.to_vec();
+        all.extend(self.tables.uses(Stage::RayTracing));
+        all.extend(self.accel.uses());
+        let push = self.push(argument0, self.rows.start);
+        let size = [self.extent[0], self.rows.end - self.rows.start];
         recorder.pass(label, |recorder| {
-            recorder.trace_rays(pipeline, Some(self.set), binds, &uses, bytemuck::bytes_of(&push), size)
+            recorder.trace_rays(pipeline, Some(self.set), binds, &all, bytemuck::bytes_of(&push), size)
         })?;
         Ok(())
     }

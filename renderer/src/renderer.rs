@@ -301,7 +301,8 @@ impl Renderer {
         let slot = recorder.slot();
         recorder.copy_buffer(accumulator, &host, size)?;
         let counters = &self.view(id)?.counters;
-        recorder.copy_buffer(&counters.device, &counters.host[slot % counters.host.len()], 16)?;
+        let copied = &counters.host[slot % counters.host.len()];
+        recorder.copy_buffer(&counters.device, copied, counters.device.size())?;
         frames.submit(recorder, None)?;
         frames.finish()?;
         let view = self.view_mut(id)?;

@@ -106,6 +106,18 @@ pub enum ReflectionRate {
     Half,
 }
 
+/// Which pixels trace shadow rays in frames of `hybrid` and `raytraced` that are denoised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShadowRate {
+    /// Each, to every light.
+    #[default]
+    Full,
+    /// Those near which the frames before met both light and shadow of a punctual light, and one of 8 in turns: while the
+    /// scene stands still, every light is visited and it is one of the first 16.
+    Penumbra,
+}
+
 /// Where the random numbers of a picture come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -187,6 +199,8 @@ pub struct ViewSettings {
     pub reflection_roughness_max: f32,
     /// How many pixels trace reflected light while it is denoised.
     pub reflection_rate: ReflectionRate,
+    /// Which pixels trace shadow rays while light is denoised.
+    pub shadow_rate: ShadowRate,
     /// Shadow rays stop at glass instead of passing it tinted and unbent.
     pub opaque_glass_shadows: bool,
     /// Denoise over time while things move. Off for headless stills, which accumulate anyway.
@@ -220,6 +234,7 @@ impl Default for ViewSettings {
             multiple_scattering: false,
             reflection_roughness_max: 0.5,
             reflection_rate: ReflectionRate::Full,
+            shadow_rate: ShadowRate::Full,
             opaque_glass_shadows: false,
             temporal: true,
             spatial: true,

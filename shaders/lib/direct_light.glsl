@@ -21,6 +21,10 @@ const bool LOBE_MEETS_LIGHTS = true;
 
 // Share of light, per channel, that comes from `origin + direction * t_max_m` to `origin`. seed: for stochastic alpha.
 vec3 light_visibility(vec3 origin, vec3 direction, float t_max_m, uint seed);
+#ifdef SHADOWS_ARE_REMEMBERED
+// The same from punctual light number `light`, or LIGHT_UNNUMBERED, where the includer may know it without a ray.
+vec3 numbered_visibility(uint light, vec3 origin, vec3 direction, float t_max_m, uint seed);
+#endif
 
 struct DirectLight {
     vec3 diffuse;   // to be multiplied by surface_diffuse_albedo
@@ -96,12 +100,16 @@ bool is_dark(DirectLight light) {
     return !(max_component(light.diffuse) > 0.0 || max_component(light.specular) > 0.0);
 }
 
-// Adds the light when something of it arrives; without it, no ray is traced.
-void add_light(inout DirectLight sum, DirectLight light, vec3 origin, vec3 direction, float t_max_m, uint seed) {
+// Adds the light when something of it arrives; without it, no ray is traced. `number`: as for numbered_visibility.
+void add_light(inout DirectLight sum, DirectLight light, uint number, LightRay ray, uint seed) {
     if (is_dark(light)) {
         return;
     }
-    vec3 share = light_visibility(origin, direction, t_max_m, seed);
+#ifdef SHADOWS_ARE_REMEMBERED
+    vec3 share = numbered_visibility(number, ray.origin, ray.along, ray.t_max_m, seed);
+#else
+    vec3 share = light_visibility(ray.origin, ray.along, ray.t_max_m, seed);
+#endif
     sum.diffuse += share * light.diffuse;
     sum.specular += share * light.specular;
 }
@@ -127,7 +135,10 @@ struct DrawnLight {
     LightRay ray;
     float specular_share;   // of the light that the traced lobe does not bring
     uint salt;              // names its random numbers
+    uint number;            // of the punctual light, when every one is visited
 };
+
+const uint LIGHT_UNNUMBERED = 0xffffffffu;
 
 // Shadow ray `which` of all those to punctual lights: `rays` to every light, or to each of `draws` lights drawn by power.
 DrawnLight punctual_light(Scene scene, Receiver receiver, uint which, uint draws, uint rays) {
@@ -151,13 +162,13 @@ DrawnLight punctual_light(Scene scene, Receiver receiver, uint which, uint draws
     }
     LightRay ray = LightRay(s.direction, s.irradiance * (weight / float(rays)), s.pdf, surface_spawn(receiver.surface, s.direction), s.direction,
         s.distance_m);
-    return DrawnLight(ray, specular_share, which);
+    return DrawnLight(ray, specular_share, which, visits_all ? number : LIGHT_UNNUMBERED);
 }
 
 DrawnLight emissive_light(Scene scene, Receiver receiver) {
     vec2 choice = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_EMISSIVE, 0u));
     vec2 xi = sample_2d(receiver.sequence, receiver_dimension(receiver, PURPOSE_EMISSIVE, 1u));
-    return DrawnLight(emissive_ray(scene, receiver.surface, choice, xi), receiver.lobe_traced && LOBE_MEETS_LIGHTS ? 0.0 : 1.0, 4094u);
+    return DrawnLight(emissive_ray(scene, receiver.surface, choice, xi), receiver.lobe_traced && LOBE_MEETS_LIGHTS ? 0.0 : 1.0, 4094u, LIGHT_UNNUMBERED);
 }
 
 DrawnLight environment_light(Scene scene, Receiver receiver) {
@@ -170,7 +181,7 @@ DrawnLight environment_light(Scene scene, Receiver receiver) {
 #ifdef LIGHT_WITHOUT_RAYS
     ray.irradiance *= receiver.surface.occlusion;
 #endif
-    return DrawnLight(ray, receiver.lobe_traced ? 0.0 : 1.0, 4095u);
+    return DrawnLight(ray, receiver.lobe_traced ? 0.0 : 1.0, 4095u, LIGHT_UNNUMBERED);
 }
 
 // draws: lights visited; rays: shadow rays to each of them. One loop over all kinds of lamps: compilers copy what is called into every place that
@@ -203,7 +214,7 @@ DirectLight direct_light(Scene scene, Receiver receiver, uint draws, uint rays) 
             drawn = environment_light(scene, receiver);
         }
         DirectLight reflected = receiver_reflect(receiver, drawn.ray.direction, drawn.ray.irradiance, drawn.specular_share);
-        add_light(sum, reflected, drawn.ray.origin, drawn.ray.along, drawn.ray.t_max_m, visibility_seed(receiver, drawn.salt));
+        add_light(sum, reflected, drawn.number, drawn.ray, visibility_seed(receiver, drawn.salt));
     }
     return sum;
 }

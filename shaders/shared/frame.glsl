@@ -14,6 +14,7 @@ const uint FRAME_PATHS_BEND = 16u;      // shadow rays stop where paths bend or 
 const uint FRAME_STEADY = 32u;          // nothing has moved since the last frame: the history is exact, and not clamped
 const uint FRAME_DENOISED = 64u;        // light is kept apart, to be denoised
 const uint FRAME_HALF_REFLECTIONS = 128u; // one pixel of each 2x2 traces its reflected light
+const uint FRAME_SHADOWS_KNOWN = 256u;  // what shadow rays met in the frames before holds for this one
 
 // Frame.tone_map, in the order of renderer::ToneMap.
 const uint TONE_MAP_LINEAR = 0u;
@@ -81,6 +82,7 @@ struct Frame {
 
 struct FrameCounters {
     uint non_finite;                    // samples dropped because a channel was not finite
+    uint shadow_rays;                   // traced by pass shadow in this frame, where it leaves some out
 };
 
 // One pixel of the accumulator (ARCHITECTURE, decision 6): for each stream the float sum of the open block and the

@@ -18,5 +18,6 @@ layout(constant_id = 11) const bool NEEDS_SHAPES = true;             // some mes
 layout(constant_id = 12) const bool NEEDS_LOBES = true;              // some material has lobes beside metallic-roughness
 layout(constant_id = 13) const bool NEEDS_RAY_DEPTH = false;         // the ray depth is shown
 layout(constant_id = 14) const bool NEEDS_DENOISING = true;          // light may be denoised over time
+layout(constant_id = 15) const bool NEEDS_KNOWN_SHADOWS = false;     // shadow rays are left out where the frames before tell what they meet
 
 #endif

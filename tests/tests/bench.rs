@@ -155,6 +155,33 @@ fn a_cloud_is_measured_whole_and_in_every_pipeline() {
 }
 
 #[test]
+fn every_setting_of_hybrid_is_timed_and_compared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let project =
+        caustica_tests::repository().join("projects/lecture-08-soft-shadows/soft-shadows.caustica.json");
+    let project = project.to_str().expect("a name in Unicode");
+    let more = ["--suite", "hybrid", "--project", project, "--reference-samples", "8", "--size", "48x32"];
+    let (run, figures) = bench(folder.path(), &more);
+    let settings = &figures["hybrid"]["settings"];
+    assert_eq!((&settings["extent_px"], &settings["samples"]), (&json!([48, 32]), &json!(2)));
+    assert_eq!(rows(settings, "rows").len(), 8, "{settings}");
+    for row in rows(settings, "rows") {
+        assert!(median(row, "frame_ms") > 0.0 && row["ratio"].as_f64() > Some(0.0), "{row}");
+        let luminance = row["error"]["luminance"].as_f64().expect("a ratio");
+        assert!((0.8..1.2).contains(&luminance), "{row}");
+        let [all, most] =
+            ["rel_mse", "rel_mse_999"].map(|name| row["error"][name].as_f64().expect("an error"));
+        assert!(all >= most && most > 0.0, "{row}");
+        let penumbra =
+            row["settings"].as_str().is_some_and(|name| name.contains("penumbra") || name.contains("both"));
+        let share = row["shadow_rays_share"].as_f64();
+        assert_eq!(share.is_some(), penumbra, "{row}");
+        assert!(share.is_none_or(|share| (0.1..1.0).contains(&share)), "{row}");
+    }
+    assert!(run.stdout.contains("Hybrid, error"), "{}", run.stdout);
+}
+
+#[test]
 fn wrong_names_and_places_are_refused_before_anything_is_measured() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = caustica(folder.path(), &["bench", "--suite", "speed", "-o", "a.json"]);

@@ -238,6 +238,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         primary_rays: false,
         paths: false,
         lobes: false,
+        known_shadows: false,
         ray_depth: false,
     };
     let cases = [
@@ -256,6 +257,7 @@ fn specialisation_constants_mean_the_same_on_both_sides() {
         ("LOBES", Needs { lobes: true, ..nothing }),
         ("RAY_DEPTH", Needs { ray_depth: true, ..nothing }),
         ("DENOISING", Needs { temporal: true, ..nothing }),
+        ("KNOWN_SHADOWS", Needs { known_shadows: true, ..nothing }),
     ];
     let text = shader_text("shared/needs.glsl");
     let count = text.matches("constant_id").count();

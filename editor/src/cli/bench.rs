@@ -4,6 +4,7 @@
 mod cloud;
 mod crowd;
 mod edits;
+mod hybrid;
 mod machine;
 mod moves;
 mod rig;
@@ -28,6 +29,7 @@ use serde_json::{Map, Value, json};
 
 use super::DeviceArgs;
 use super::render::report_validation;
+use hybrid::HybridArgs;
 use table::Table;
 
 /// A named list of measurements.
@@ -42,9 +44,11 @@ struct Part {
     run: fn(&Bench) -> anyhow::Result<Measured>,
 }
 
-const SUITES: [Suite; 2] = [ACCEL, SHAPES];
+const SUITES: [Suite; 3] = [ACCEL, SHAPES, HYBRID];
 
 const SHAPES: Suite = Suite { name: "shapes", parts: &[Part { name: "cloud", run: cloud::run }] };
+
+const HYBRID: Suite = Suite { name: "hybrid", parts: &[Part { name: "settings", run: hybrid::run }] };
 
 const ACCEL: Suite = Suite {
     name: "accel",
@@ -78,6 +82,8 @@ pub(super) struct BenchArgs {
     /// Print the JSON object on standard output instead of tables
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    hybrid: HybridArgs,
 }
 
 fn names(known: &[&'static str]) -> PossibleValuesParser {
@@ -94,6 +100,7 @@ struct Bench {
     shaders: Option<PathBuf>,
     quick: bool,
     progress: bool,
+    hybrid: HybridArgs,
 }
 
 impl Bench {
@@ -131,7 +138,13 @@ pub(super) fn run(
 ) -> anyhow::Result<ExitCode> {
     let device = device.open()?;
     let progress = !args.json && std::io::stderr().is_terminal();
-    let bench = Bench { device: Arc::clone(&device), shaders, quick: args.quick, progress };
+    let bench = Bench {
+        device: Arc::clone(&device),
+        shaders,
+        quick: args.quick,
+        progress,
+        hybrid: args.hybrid.clone(),
+    };
     let mut report = head(args, &device);
     // Written after every part: a run that is cut short leaves what it has measured.
     write(args, &report)?;

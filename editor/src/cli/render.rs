@@ -15,6 +15,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 pub(super) use args::RenderArgs;
+pub(super) use args::parse_size;
 use args::settings_of;
 
 use super::DeviceArgs;
@@ -231,6 +232,7 @@ fn summary(
         "acceleration_structures": statistics.acceleration,
         "memory_bytes": memory,
         "non_finite_samples": statistics.non_finite,
+        "shadow_rays_of_last_frame": (statistics.shadow_rays > 0).then_some(statistics.shadow_rays),
         "reset_reason": statistics.reset_reason,
         "left_out": statistics.left_out,
     })

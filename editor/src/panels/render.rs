@@ -2,7 +2,7 @@
 
 use caustica_renderer::delta::LightId;
 use caustica_renderer::{
-    NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Sampling, Show, ToneMap, ViewSettings,
+    NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Sampling, ShadowRate, Show, ToneMap, ViewSettings,
 };
 use egui::{DragValue, Slider, Ui};
 
@@ -251,6 +251,16 @@ fn moving(cx: &mut Cx<'_>, ui: &mut Ui, settings: &mut ViewSettings) {
             let mut half = settings.reflection_rate == ReflectionRate::Half;
             ui.add_enabled(settings.temporal, egui::Checkbox::new(&mut half, "at half the rate"));
             settings.reflection_rate = if half { ReflectionRate::Half } else { ReflectionRate::Full };
+        },
+    );
+    field(
+        ui,
+        "Shadows",
+        "Trace them where light and shadow meet, and in one pixel of eight, while the camera moves: faster",
+        |ui| {
+            let mut penumbra = settings.shadow_rate == ShadowRate::Penumbra;
+            ui.add_enabled(settings.temporal, egui::Checkbox::new(&mut penumbra, "in penumbrae alone"));
+            settings.shadow_rate = if penumbra { ShadowRate::Penumbra } else { ShadowRate::Full };
         },
     );
     let config = &mut cx.state.config;

@@ -93,6 +93,8 @@ pub const FRAME_STEADY: u32 = 32;
 pub const FRAME_DENOISED: u32 = 64;
 /// [`super::Frame::flags`]: one pixel of each 2 x 2 traces its reflected light.
 pub const FRAME_HALF_REFLECTIONS: u32 = 128;
+/// [`super::Frame::flags`]: what shadow rays met in the frames before holds for this one.
+pub const FRAME_SHADOWS_KNOWN: u32 = 256;
 
 /// [`super::Frame::tone_map`]: clamp.
 pub const TONE_MAP_LINEAR: u32 = 0;

@@ -105,6 +105,9 @@ pub struct Statistics {
     pub left_out: Vec<LeftOut>,
     /// Samples dropped since the last reset because a channel was not finite.
     pub non_finite: u64,
+    /// Shadow rays of the last frame to punctual lights from the first surfaces; counted with
+    /// [`ShadowRate::Penumbra`](crate::ShadowRate::Penumbra) alone.
+    pub shadow_rays: u64,
     /// Bytes uploaded in the last frame, constants included.
     pub uploaded_bytes: u64,
 }

@@ -34,7 +34,7 @@ impl Deferred {
         moving: Option<Moving<'_>>,
     ) -> Result<()> {
         if let Some(shadow) = &self.shadow {
-            shadow.record(recorder, scope, targets, parity)?;
+            shadow.record(recorder, scope, targets, parity, moving)?;
         }
         let direct = targets.direct_diffuse.as_ref().zip(targets.direct_specular.as_ref());
         let Some((denoise, moving)) = self.denoise.as_ref().zip(moving) else {

@@ -117,32 +117,42 @@ impl Filter {
         parity: usize,
         filled: usize,
     ) -> Result<()> {
-        let binds = |from, to| filter_binds(targets, history, (parity, filled), from, to);
-        let [a, b] = [history.filtered[0].each_ref(), history.filtered[1].each_ref()];
         let past = [&history.diffuse[filled], &history.specular[filled], &history.reflected[filled]];
-        scope.compute(recorder, "denoise.variance", &self.variance, &binds(past, a), &[], 0)?;
+        let filtered = |i: usize| history.filtered[i].each_ref();
+        let binds = |from, to| filter_binds(targets, history, (parity, filled), from, to);
+        scope.compute(
+            recorder,
+            "denoise.variance",
+            &self.variance,
+            &binds((past, 1), (filtered(0), 0)),
+            &[],
+            0,
+        )?;
         for (i, apart_px) in STEPS_PX.into_iter().enumerate() {
-            let (from, to) = if i % 2 == 0 { (a, b) } else { (b, a) };
-            scope.compute(recorder, "denoise.filter", &self.step, &binds(from, to), &[], apart_px)?;
+            let (from, to) = (i % 2, (i + 1) % 2);
+            let binds = binds((filtered(from), from), (filtered(to), to));
+            scope.compute(recorder, "denoise.filter", &self.step, &binds, &[], apart_px)?;
         }
         Ok(())
     }
 }
 
-/// What the steps of the filter read and write: light goes from `from` to `to`.
+/// What the steps of the filter read and write: light goes from `from` to `to`, each with the number of its guide.
 fn filter_binds<'a>(
     targets: &'a Targets,
     history: &'a History,
     (parity, filled): (usize, usize),
-    from: Signals<'a>,
-    to: Signals<'a>,
-) -> [(&'static str, Bind<'a>); 11] {
+    (from, from_guide): (Signals<'a>, usize),
+    (to, to_guide): (Signals<'a>, usize),
+) -> [(&'static str, Bind<'a>); 13] {
     let named = [
         ("gbuffer_id", &targets.id),
         ("gbuffer_normal", &targets.normal[parity % targets.normal.len()]),
         ("gbuffer_depth", &targets.depth[parity % targets.depth.len()]),
         ("image_of_surface", &history.image[filled]),
         ("moments", &history.moments[filled]),
+        ("in_guide", &history.guide[from_guide]),
+        ("out_guide", &history.guide[to_guide]),
         ("in_diffuse", from[0]),
         ("in_specular", from[1]),
         ("in_reflected", from[2]),

@@ -70,9 +70,7 @@ impl GBuffer {
             ("gbuffer_emissive", Bind::Image(targets.emissive.as_ref().unwrap_or(&targets.shaded))),
         ];
         match self {
-            Self::Rays { trace } => {
-                scope.rays(recorder, "gbuffer.trace", trace, &binds, 0..scope.extent[1], 1)
-            }
+            Self::Rays { trace } => scope.whole().rays(recorder, "gbuffer.trace", trace, &binds, &[], 1),
             Self::Raster { opaque, alpha, shapes, resolve } => {
                 let pipelines = [Some(opaque), alpha.as_ref(), shapes.as_ref()];
                 draw(recorder, scope, pipelines, &targets.id, depth)?;

@@ -28,6 +28,6 @@ impl LightShadow {
     ) -> Result<()> {
         let argument0 = light | if fresh { LIGHT_SHADOW_FRESH } else { 0 };
         let binds = [("gbuffer_id", Bind::Image(id)), ("light_shadow", Bind::Image(light_shadow))];
-        scope.rays(recorder, "light_shadow.trace", &self.trace, &binds, 0..scope.extent[1], argument0)
+        scope.whole().rays(recorder, "light_shadow.trace", &self.trace, &binds, &[], argument0)
     }
 }

@@ -39,7 +39,7 @@ impl PathTrace {
             ("reflected", Bind::Image(&targets.reflected)),
             ("reflected_tint", Bind::Image(&targets.reflected_tint)),
         ];
-        scope.rays(recorder, "path_trace", &self.pipeline, &binds, scope.rows.clone(), 0)?;
+        scope.rays(recorder, "path_trace", &self.pipeline, &binds, &[], 0)?;
         let Some((denoise, moving)) = self.denoise.as_ref().zip(moving) else { return Ok(()) };
         let Some(signals) = denoise.record(recorder, scope, targets, parity, moving)? else { return Ok(()) };
         denoise.compose(recorder, scope, targets, parity, signals)

@@ -49,9 +49,7 @@ impl Shading {
         ];
         let has_light = u32::from(light.is_some());
         match self {
-            Self::Rays(pipeline) => {
-                scope.rays(recorder, "shading.trace", pipeline, &binds, scope.rows.clone(), has_light)
-            }
+            Self::Rays(pipeline) => scope.rays(recorder, "shading.trace", pipeline, &binds, &[], has_light),
             // Once a sample, with its last band.
             Self::NoRays(_) if scope.rows.end < scope.extent[1] => Ok(()),
             Self::NoRays(pipeline) => scope.compute(recorder, "shading", pipeline, &binds, &[], has_light),

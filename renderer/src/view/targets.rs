@@ -21,6 +21,8 @@ pub(crate) struct History {
     pub(crate) moments: [Image; 2],
     /// Diffuse, specular and reflected light in turns between the steps of the filter; one texel as in the four above.
     pub(crate) filtered: [[Image; 3]; 2],
+    /// What the steps of the filter compare these by, in turns as well; one texel when nothing is filtered over space.
+    pub(crate) guide: [Image; 2],
 }
 
 /// The images of another size that hold the past of a view which was resized.
@@ -47,6 +49,9 @@ pub(crate) struct Targets {
     /// What rays bring, to be denoised; one texel when nothing is.
     pub(crate) reflected: Image,
     pub(crate) reflected_tint: Image,
+    /// What shadow rays met, and for the next frame: two taken in turns as those of the history; one texel when none is left
+    /// out.
+    pub(crate) shadows: [Image; 2],
     pub(crate) history: Option<History>,
     /// There until a frame of the new size is complete, in place of what `normal`, `depth` and `history` hold of the past.
     pub(crate) past: Option<Past>,
@@ -102,8 +107,10 @@ impl Targets {
                 image: pair(brought, "history_image")?,
                 moments: pair(needs.spatial, "history_moments")?,
                 filtered: [filtered()?, filtered()?],
+                guide: pair(needs.spatial, "guide")?,
             })
         });
+        let shadows = || or_one_texel(needs.known_shadows, "shadows", Format::R32Uint);
         let optional = |wanted: bool, name: &str, format| wanted.then(|| make(name, format)).transpose();
         Ok(Self {
             id: make("gbuffer_id", Format::Rgba32Uint)?,
@@ -127,6 +134,7 @@ impl Targets {
                 "reflected_tint",
                 Format::Rgba16Float,
             )?,
+            shadows: [shadows()?, shadows()?],
             history: history.transpose()?,
             past: None,
             shaded: make("shaded", Format::Rgba32Float)?,

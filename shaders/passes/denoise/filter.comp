@@ -1,4 +1,5 @@
-// Pass denoise, one of its a-trous steps. In: the signals with their variance in a; push.argument0: pixels between taps. Out: the same, smoother.
+// Pass denoise, one of its a-trous steps. In: the signals with their variance in a, their guide; push.argument0: pixels between taps. Out: the same,
+// smoother.
 // A 5x5 B3 spline whose taps count as far as they show the same surface, and differ no more than the noise does (Dammertz et al., "Edge-Avoiding
 // A-Trous Wavelet Transform", HPG 2010; weights of Schied et al., "Spatiotemporal Variance-Guided Filtering", HPG 2017, section 4.4).
 #version 460
@@ -8,32 +9,25 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "passes/denoise/signals.glsl"
 
-// Taps differ by the noise when their luminance differs by this many standard deviations.
-const float DEVIATIONS = 4.0;
+layout(set = 1, binding = 11) uniform texture2D in_guide;
+
+// Taps differ by the noise when their guide differs by this many standard deviations of single pixels, which vary 3.7 times as much as a mean over
+// 5x5. The first step smooths the pixels more than the guide, which is smooth already.
+const float DEVIATIONS = 1.5;
+const float DEVIATIONS_FIRST = 0.7;
 // And by this share of the luminance: where no noise is left, rounding is.
 const float LEAST_SHARE = 1e-3;
-const float SPLINE[3] = float[3](3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0);
 
 struct Sum {
     vec4 value;
+    float guide;
     float weight;
 };
 
-// What the pixels around say, of diffuse, specular and reflected light.
-struct Around {
-    vec3 variance;      // blurred over 3x3: that of one pixel is too uncertain to be compared by
-    vec3 luminance;     // of the pixel, no further out than its neighbours: a lone bright pixel is not what others are compared with
-};
-
-vec3 luminances(Signals signals) {
-    return vec3(luminance(signals.diffuse.rgb), luminance(signals.specular.rgb), luminance(signals.reflected.rgb));
-}
-
-Around look_around(Frame frame, ivec2 at, Place place, Signals centre) {
+// Blurred over 3x3: that of one pixel is too uncertain to be compared by.
+vec3 variance_around(Frame frame, ivec2 at, Place place, Signals centre) {
     vec3 variance = 0.25 * vec3(centre.diffuse.a, centre.specular.a, centre.reflected.a);
     float total = 0.25;
-    vec3 least = vec3(FLOAT_MAX);
-    vec3 most = vec3(0.0);
     for (int i = 0; i < 9; ++i) {
         ivec2 offset = ivec2(i % 3, i / 3) - 1;
         ivec2 p = at + offset;
@@ -44,22 +38,25 @@ Around look_around(Frame frame, ivec2 at, Place place, Signals centre) {
         float weight = offset.x == 0 || offset.y == 0 ? 0.125 : 0.0625;
         variance += weight * vec3(signals.diffuse.a, signals.specular.a, signals.reflected.a);
         total += weight;
-        least = min(least, luminances(signals));
-        most = max(most, luminances(signals));
     }
-    vec3 own = luminances(centre);
-    return Around(variance / total, total > 0.25 ? clamp(own, least, most) : own);
+    return variance / total;
 }
 
-void add_tap(inout Sum sum, vec4 value, float expected, float deviation, float weight) {
-    float off = abs(luminance(value.rgb) - expected);
-    weight *= exp(-off / (DEVIATIONS * deviation + LEAST_SHARE * expected + 1e-30));
+// By the noise of both, alike from either side: a bright, rare sample knows of its own, those around it may not.
+void add_tap(inout Sum sum, vec4 value, float guide, float expected, float variance, float deviations, float weight) {
+    float deviation = sqrt(0.5 * (variance + value.a));
+    weight *= exp(-abs(guide - expected) / (deviations * deviation + LEAST_SHARE * expected + 1e-30));
     sum.value += vec4(weight * value.rgb, weight * weight * value.a);
+    sum.guide += weight * guide;
     sum.weight += weight;
 }
 
 vec4 result(Sum sum, vec4 centre) {
     return sum.weight > 0.0 ? vec4(sum.value.rgb / sum.weight, sum.value.a / (sum.weight * sum.weight)) : centre;
+}
+
+float guide_of(Sum sum, float centre) {
+    return sum.weight > 0.0 ? sum.guide / sum.weight : centre;
 }
 
 void main() {
@@ -72,16 +69,18 @@ void main() {
     Signals centre = signals_at(frame, at);
     Place place = place_at(frame, at);
     if (place.id.x == 0u) {
+        imageStore(out_guide, at, vec4(0.0));
         store(frame, at, centre);
         return;
     }
-    Around around = look_around(frame, at, place, centre);
-    vec3 deviation = sqrt(around.variance);
-    const Sum nothing = Sum(vec4(0.0), 0.0);
+    vec3 variance = variance_around(frame, at, place, centre);
+    vec3 expected = texelFetch(in_guide, at, 0).rgb;
+    const Sum nothing = Sum(vec4(0.0), 0.0, 0.0);
     Sum diffuse = nothing;
     Sum specular = nothing;
     Sum brought = nothing;
     int apart_px = int(push.argument0);
+    float deviations = apart_px == 1 ? DEVIATIONS_FIRST : DEVIATIONS;
     for (int y = -2; y <= 2; ++y) {
         for (int x = -2; x <= 2; ++x) {
             ivec2 offset = ivec2(x, y) * apart_px;
@@ -93,10 +92,13 @@ void main() {
                 continue;
             }
             Signals tap = signals_at(frame, at + offset);
-            add_tap(diffuse, tap.diffuse, around.luminance.x, deviation.x, same.x);
-            add_tap(specular, tap.specular, around.luminance.y, deviation.y, same.x);
-            add_tap(brought, tap.reflected, around.luminance.z, deviation.z, same.y);
+            vec3 guide = texelFetch(in_guide, at + offset, 0).rgb;
+            add_tap(diffuse, tap.diffuse, guide.x, expected.x, variance.x, deviations, same.x);
+            add_tap(specular, tap.specular, guide.y, expected.y, variance.y, deviations, same.x);
+            add_tap(brought, tap.reflected, guide.z, expected.z, variance.z, deviations, same.y);
         }
     }
+    vec3 guide = vec3(guide_of(diffuse, expected.x), guide_of(specular, expected.y), guide_of(brought, expected.z));
+    imageStore(out_guide, at, vec4(guide, 0.0));
     store(frame, at, Signals(result(diffuse, centre.diffuse), result(specular, centre.specular), result(brought, centre.reflected)));
 }

@@ -19,7 +19,10 @@ layout(set = 1, binding = 6) uniform texture2D in_reflected;
 layout(set = 1, binding = 7, rgba32f) uniform writeonly image2D out_diffuse;
 layout(set = 1, binding = 8, rgba32f) uniform writeonly image2D out_specular;
 layout(set = 1, binding = 9, rgba32f) uniform writeonly image2D out_reflected;
+layout(set = 1, binding = 10, rgba32f) uniform writeonly image2D out_guide;     // luminances of the three, blurred: what pixels are compared by
 
+// B3 spline: weights of a 5x5 kernel by the distance from its middle.
+const float SPLINE[3] = float[3](3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0);
 // Exponent of the cosine between normals.
 const float NORMAL_POWER = 64.0;
 // Reverse depth may leave the plane of the pixel by this share of what the plane itself changes, and of the depth.
@@ -63,6 +66,10 @@ void store(Frame frame, ivec2 p, Signals signals) {
     if (HAS_REFLECTED) {
         imageStore(out_reflected, p, signals.reflected);
     }
+}
+
+vec3 luminances(Signals signals) {
+    return vec3(luminance(signals.diffuse.rgb), luminance(signals.specular.rgb), luminance(signals.reflected.rgb));
 }
 
 bool inside(Frame frame, ivec2 p) {

@@ -1,4 +1,4 @@
-// Pass denoise, first step: how noisy each signal is. In: the history of pass temporal and the moments of its luminance. Out: the signals, the variance
+// Pass denoise, first step: how noisy each signal is. In: the history of pass temporal and the moments of its luminance. Out: the guide, the signals, the variance
 // of their luminance in a: that of single samples over the number of frames; while those are few, of single samples around
 // (after Schied et al., "Spatiotemporal Variance-Guided Filtering", HPG 2017, section 4.2).
 #version 460
@@ -8,7 +8,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "passes/denoise/signals.glsl"
 
-layout(set = 1, binding = 10) uniform texture2D moments; // of diffuse and of specular light; those of reflected light are in image_of_surface.xy
+layout(set = 1, binding = 11) uniform texture2D moments; // of diffuse and of specular light; those of reflected light are in image_of_surface.xy
 
 // Up to this many frames, single samples vary as they do among the neighbours: pixels that met no light yet do not know of their noise.
 const float FEW_FRAMES = 16.0;
@@ -50,6 +50,24 @@ Spread spread_among_neighbours(Frame frame, ivec2 at) {
     return Spread(sum.mean / total, sum.mean_of_squares / total);
 }
 
+// Luminances blurred over 5x5 pixels of the surface. Single samples would be no guide: the bright and rare ones differ from all around by more than
+// the noise that those know of, and none would take their light.
+vec3 guide_at(Frame frame, ivec2 at, uvec2 id) {
+    vec3 sum = vec3(0.0);
+    float total = 0.0;
+    for (int y = -2; y <= 2; ++y) {
+        for (int x = -2; x <= 2; ++x) {
+            ivec2 p = at + ivec2(x, y);
+            if (inside(frame, p) && texelFetch(gbuffer_id, p, 0).xw == id) {
+                float weight = SPLINE[abs(x)] * SPLINE[abs(y)];
+                sum += weight * luminances(signals_at(frame, p));
+                total += weight;
+            }
+        }
+    }
+    return sum / total;
+}
+
 void main() {
     Frame frame = FrameTable(push.frame_address).frame;
     uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -57,7 +75,9 @@ void main() {
         return;
     }
     ivec2 at = ivec2(pixel);
-    if (texelFetch(gbuffer_id, at, 0).x == 0u) {
+    uvec4 id = texelFetch(gbuffer_id, at, 0);
+    if (id.x == 0u) {
+        imageStore(out_guide, at, vec4(0.0));
         store(frame, at, Signals(vec4(0.0), vec4(0.0), vec4(0.0)));
         return;
     }
@@ -77,4 +97,5 @@ void main() {
     signals.specular.a = variance.y;
     signals.reflected.a = variance.z;
     store(frame, at, signals);
+    imageStore(out_guide, at, vec4(guide_at(frame, at, id.xw), 0.0));
 }

@@ -13,6 +13,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/element.glsl"
 #include "lib/light_signals.glsl"
 #include "lib/octahedral.glsl"
+#include "lib/reprojection.glsl"
 
 layout(set = 1, binding = 0) uniform utexture2D gbuffer_id;
 layout(set = 1, binding = 1) uniform utexture2D gbuffer_normal;
@@ -33,12 +34,8 @@ layout(set = 1, binding = 15, rgba32f) uniform writeonly image2D history_reflect
 layout(set = 1, binding = 16, rgba32f) uniform writeonly image2D history_moments;   // of diffuse and of specular light
 layout(set = 1, binding = 17, rgba32f) uniform writeonly image2D history_image;     // moments of the reflected light, reverse depth of its image
 
-// Normals further apart than this belong to different surfaces (cosine of 25 degrees).
-const float SAME_NORMAL = 0.906;
 // The history may differ from the neighbours' mean by this many of their standard deviations.
 const float CLAMP_DEVIATIONS = 2.0;
-// Depths agree within the footprint of this many pixels, and of 1.5 more where the surface is seen at a slant.
-const float DEPTH_PIXELS = 4.0;
 // Reverse depths of images agree up to this share of the larger one.
 const float IMAGE_DEPTH_SHARE = 0.2;
 // Images are no further away than this many times the distance of their surface: far enough for the sky.
@@ -125,18 +122,6 @@ ivec2 previous_extent() {
     return textureSize(previous_normal, 0);
 }
 
-// Largest difference of reverse depth between the point seen now and a tap that shows the same surface. Perspective depth is near / distance, so
-// a footprint is a share of it; orthographic depth is affine.
-float depth_tolerance(Frame frame, float depth, float cosine) {
-    float pixels = DEPTH_PIXELS + 1.5 / max(cosine, 0.05);
-    float size = pixels * 2.0 * frame.half_extent.y / float(min(int(frame.extent_px.y), previous_extent().y));
-    if ((frame.flags & FRAME_ORTHOGRAPHIC) == 0u) {
-        return min(size, 0.5) * depth;
-    }
-    mat4 m = frame.previous_clip_from_render;
-    return size * length(vec3(m[0].z, m[1].z, m[2].z));
-}
-
 // The surface of a pixel, now and in the last frame.
 struct Seen {
     vec3 position;
@@ -199,7 +184,7 @@ void reproject_surface(Frame frame, uvec2 pixel, Seen seen, bool with_reflected,
         return;
     }
     float depth = clip.z / clip.w;
-    float tolerance = depth_tolerance(frame, depth, abs(dot(seen.geometric_normal, seen.direction)));
+    float tolerance = depth_tolerance(frame, previous_extent(), depth, abs(dot(seen.geometric_normal, seen.direction)));
     Signals sum = NO_SIGNALS;
     float total = 0.0;
     float reflected_total = 0.0;

@@ -193,7 +193,7 @@ impl Pass {
         };
         let mut recorder = session.frames.begin().expect("a frame");
         if i == 0 {
-            recorder.clear_buffer(&self.counters);
+            recorder.clear_buffer(&self.counters, 0..4);
         }
         recorder.upload_image(&self.shaded, bytemuck::cast_slice(texels)).expect("an upload");
         let frame_address = recorder.stage_bytes(bytemuck::bytes_of(&frame)).expect("staging");

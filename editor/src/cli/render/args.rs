@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use caustica_renderer::{NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, Show, ToneMap, ViewSettings};
+use caustica_renderer::{
+    NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, ShadowRate, Show, ToneMap, ViewSettings,
+};
 use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
 
@@ -63,6 +65,9 @@ pub(in crate::cli) struct RenderArgs {
     /// With --denoise, which pixels trace reflected light in a frame: each, or one of 2x2 in turns
     #[arg(long, value_enum)]
     reflection_rate: Option<RateArg>,
+    /// With --denoise, which pixels trace shadow rays: each, or those in penumbrae and one of 8 in turns
+    #[arg(long, value_enum)]
+    shadow_rate: Option<ShadowRateArg>,
     /// How `hybrid` finds the first surfaces: `auto` as is faster on the device, by its profile
     #[arg(long, value_enum)]
     primary: Option<PrimaryArg>,
@@ -118,6 +123,12 @@ enum RateArg {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+enum ShadowRateArg {
+    Full,
+    Penumbra,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum PrimaryArg {
     Auto,
     Raster,
@@ -152,7 +163,7 @@ enum SamplerArg {
     BlueNoise,
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+pub(in crate::cli) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));
     match [side(width)?, side(height)?] {
@@ -222,6 +233,10 @@ pub(super) fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSe
         reflection_rate: args.reflection_rate.map_or(of_project.reflection_rate, |rate| match rate {
             RateArg::Full => ReflectionRate::Full,
             RateArg::Half => ReflectionRate::Half,
+        }),
+        shadow_rate: args.shadow_rate.map_or(of_project.shadow_rate, |rate| match rate {
+            ShadowRateArg::Full => ShadowRate::Full,
+            ShadowRateArg::Penumbra => ShadowRate::Penumbra,
         }),
         primary: args.primary.map_or(of_project.primary, |primary| match primary {
             PrimaryArg::Auto => Primary::Auto,

@@ -1,5 +1,7 @@
 //! Uploads by way of staging memory, mip levels, and copies back to the host. Every range is checked first.
 
+use std::ops::Range;
+
 use ash::vk;
 
 use super::{Recorder, Use};
@@ -206,11 +208,17 @@ impl Recorder {
         Ok(())
     }
 
-    /// Sets every byte of a buffer to zero.
-    pub fn clear_buffer(&mut self, target: &Buffer) {
+    /// Sets a range of a buffer to zero, as far as the buffer goes; its ends are multiples of 4.
+    pub fn clear_buffer(&mut self, target: &Buffer, bytes: Range<u64>) {
         self.declare(&[Use::Buffer(target, Stage::Transfer, Access::TransferWrite)]);
-        // SAFETY: the whole buffer; its size is a multiple of 4 or the rest is left alone by the driver.
-        unsafe { self.device.raw.cmd_fill_buffer(self.command, target.raw, 0, vk::WHOLE_SIZE, 0) };
+        let end = bytes.end.min(target.size());
+        if bytes.start >= end {
+            return;
+        }
+        // SAFETY: the range lies in the buffer and is not empty.
+        unsafe {
+            self.device.raw.cmd_fill_buffer(self.command, target.raw, bytes.start, end - bytes.start, 0);
+        }
     }
 }
 

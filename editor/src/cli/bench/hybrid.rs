@@ -1,0 +1,316 @@
+//! What the settings of `hybrid` cost and how far their pictures are from the truth. Enters: a project, sizes. Leaves: milliseconds
+//! of a frame and of its passes, and the error against a picture of many samples that were not denoised.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use caustica_renderer::gpu::DeviceKind;
+use caustica_renderer::{Pipeline, Primary, ReflectionRate, ShadowRate, ViewSettings};
+use clap::Args;
+use serde::Serialize;
+use serde_json::json;
+
+use super::series::{Series, Spread, passes_ms};
+use super::table::{Table, times};
+use super::{Bench, Measured};
+use crate::cli::render::parse_size;
+use crate::session::{Session, SessionOptions, load};
+
+const PROJECT: &str = "projects/gallery/gallery.caustica.json";
+
+/// Arguments of suite `hybrid`.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Suite hybrid")]
+pub(super) struct HybridArgs {
+    /// Project or model that is rendered
+    #[arg(long, value_name = "FILE", default_value = PROJECT)]
+    project: PathBuf,
+    /// Columns and rows (default: 1280x720, with a processor as the device 320x180)
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// Samples of each picture, one a frame
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(2..))]
+    samples: u32,
+    /// Samples of the reference (default: 1024, with a processor as the device 64)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    reference_samples: Option<u32>,
+    /// Pictures of each variant, which take turns, each of other random numbers
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    rounds: u32,
+}
+
+/// One choice of settings.
+struct Variant {
+    name: &'static str,
+    set: fn(&mut ViewSettings),
+}
+
+/// The first is what the others are compared with.
+const VARIANTS: [Variant; 8] = [
+    Variant { name: "not denoised", set: |_| () },
+    Variant { name: "--primary raster", set: |settings| settings.primary = Primary::Raster },
+    Variant { name: "--primary rays", set: |settings| settings.primary = Primary::Rays },
+    Variant { name: "--denoise temporal", set: |settings| denoise(settings, false) },
+    Variant { name: "--denoise full", set: |settings| denoise(settings, true) },
+    Variant {
+        name: "--denoise full --reflection-rate half",
+        set: |settings| {
+            denoise(settings, true);
+            settings.reflection_rate = ReflectionRate::Half;
+        },
+    },
+    Variant {
+        name: "--denoise full --shadow-rate penumbra",
+        set: |settings| {
+            denoise(settings, true);
+            settings.shadow_rate = ShadowRate::Penumbra;
+        },
+    },
+    Variant {
+        name: "--denoise full, both rates",
+        set: |settings| {
+            denoise(settings, true);
+            settings.reflection_rate = ReflectionRate::Half;
+            settings.shadow_rate = ShadowRate::Penumbra;
+        },
+    },
+];
+
+fn denoise(settings: &mut ViewSettings, spatial: bool) {
+    (settings.temporal, settings.spatial, settings.denoise_stills) = (true, spatial, true);
+}
+
+/// Passes that are shown, by the beginnings of their labels.
+const PASSES: [(&str, &[&str]); 4] = [
+    ("first surfaces", &["gbuffer"]),
+    ("shadow", &["shadow"]),
+    ("shading", &["shading"]),
+    ("denoiser", &["temporal", "denoise"]),
+];
+
+/// Difference from the reference, all pixels and channels, means over the rounds.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+struct Error {
+    /// Mean of (x - r)^2 / (r^2 + 0.01), r the reference.
+    rel_mse: f64,
+    /// Without the worst 0.1 % of pixels.
+    rel_mse_999: f64,
+    /// Mean luminance (Rec. 709), by that of the reference.
+    luminance: f64,
+}
+
+/// Figures of one variant.
+#[derive(Debug, Serialize)]
+struct Row {
+    settings: &'static str,
+    /// Device time of a frame but the first of each picture, which has no past.
+    frame_ms: Spread,
+    passes_ms: Vec<(&'static str, Spread)>,
+    /// Frame time by that of the first variant.
+    ratio: Option<f64>,
+    /// Shadow rays of the last frame by those of the first one, which has no past; none where all are traced anyway.
+    shadow_rays_share: Option<f64>,
+    error: Error,
+}
+
+/// What is measured of one variant, round after round.
+#[derive(Default)]
+struct Tally {
+    frame: Series,
+    passes: [Series; PASSES.len()],
+    /// Of the first frames, and of the last ones.
+    shadow_rays: [u64; 2],
+    error: Error,
+}
+
+pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
+    let args = &bench.hybrid;
+    let on_processor = bench.device.kind() == DeviceKind::Cpu;
+    let (extent_px, samples, many) = match () {
+        () if bench.quick => ([64, 36], 2, 4),
+        () if on_processor => ([320, 180], args.samples, 64),
+        () => ([1280, 720], args.samples, 1024),
+    };
+    let extent_px = args.size.unwrap_or(extent_px);
+    let many = args.reference_samples.unwrap_or(many);
+    let rounds = if bench.quick { 1 } else { args.rounds };
+    let options =
+        SessionOptions { shaders: bench.shaders.clone(), extent: extent_px, ..SessionOptions::default() };
+    let mut session = Session::new(&bench.device, options)?;
+    session.open(&args.project, load(&args.project, &|_, _| ())?)?;
+    let of_project =
+        ViewSettings { pipeline: Pipeline::Hybrid, temporal: false, ..session.settings().clone() };
+    let bar = bench.bar("hybrid", VARIANTS.len() * rounds as usize + 1);
+    // Of random numbers that no round has.
+    session.set_settings(ViewSettings { seed: u32::MAX, ..of_project.clone() });
+    let reference = picture(&mut session, extent_px, many, |_, _| ())?.mean;
+    bar.inc(1);
+    let mut tallies: [Tally; VARIANTS.len()] = Default::default();
+    for round in 0..rounds {
+        for (variant, tally) in VARIANTS.iter().zip(&mut tallies) {
+            bar.set_message(variant.name);
+            let mut settings = ViewSettings { seed: round, ..of_project.clone() };
+            (variant.set)(&mut settings);
+            session.set_settings(settings);
+            let picture =
+                picture(&mut session, extent_px, samples, |frame, session| tally.take(frame, session))?;
+            tally.shadow_rays = [0, 1].map(|i| tally.shadow_rays[i] + picture.shadow_rays[i]);
+            tally.compare(&reference, &picture.mean, rounds)?;
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    let rows = rows(&tallies);
+    let figures = json!({
+        "project": args.project, "extent_px": extent_px, "samples": samples, "rounds": rounds,
+        "reference_samples": many, "rows": rows,
+    });
+    let title = format!(
+        "{}, {} x {}, {samples} samples, {rounds} rounds, against {many} samples",
+        args.project.display(),
+        extent_px[0],
+        extent_px[1]
+    );
+    Ok(Measured { figures, tables: vec![time_table(&title, &rows), error_table(&title, &rows)] })
+}
+
+struct Picture {
+    mean: Vec<[f32; 3]>,
+    /// Of the first frame and of the last one.
+    shadow_rays: [u64; 2],
+}
+
+/// So many frames of one sample each; `look` sees the session after each of them, by number.
+fn picture(
+    session: &mut Session,
+    extent_px: [u32; 2],
+    samples: u32,
+    mut look: impl FnMut(u32, &Session),
+) -> anyhow::Result<Picture> {
+    let mut first = 0;
+    for frame in 0..samples {
+        let recorder = session.begin_frame(extent_px)?;
+        session.submit(recorder, None)?;
+        session.finish()?;
+        look(frame, session);
+        if frame == 0 {
+            // Counts are those of the last frame only after everything was read.
+            session.read_back()?;
+            first = session.statistics().shadow_rays;
+        }
+    }
+    let mean = session.read_back()?.mean;
+    Ok(Picture { mean, shadow_rays: [first, session.statistics().shadow_rays] })
+}
+
+impl Tally {
+    fn take(&mut self, frame: u32, session: &Session) {
+        let statistics = session.statistics();
+        if frame == 0 {
+            return;
+        }
+        self.frame.push(passes_ms(&statistics.passes, &[""]));
+        for ((_, labels), series) in PASSES.iter().zip(&mut self.passes) {
+            series.push(passes_ms(&statistics.passes, labels));
+        }
+    }
+
+    /// Adds the error of one of `rounds` pictures.
+    fn compare(&mut self, reference: &[[f32; 3]], mean: &[[f32; 3]], rounds: u32) -> anyhow::Result<()> {
+        let error = error_of(reference, mean).context("pictures of different sizes, or none")?;
+        let share = 1.0 / f64::from(rounds);
+        self.error.rel_mse += share * error.rel_mse;
+        self.error.rel_mse_999 += share * error.rel_mse_999;
+        self.error.luminance += share * error.luminance;
+        Ok(())
+    }
+}
+
+/// `None` where the pictures differ in size, or hold nothing.
+fn error_of(reference: &[[f32; 3]], mean: &[[f32; 3]]) -> Option<Error> {
+    let wide = |pixel: &[f32; 3]| pixel.map(f64::from);
+    let of_pixel = |(r, x): (&[f32; 3], &[f32; 3])| {
+        let terms = wide(r).into_iter().zip(wide(x)).map(|(r, x)| (x - r) * (x - r) / (r * r + 0.01));
+        terms.sum::<f64>() / 3.0
+    };
+    let luminance = |image: &[[f32; 3]]| {
+        let [r, g, b] = image.iter().map(wide).fold([0.0; 3], |sum, x| [0, 1, 2].map(|i| sum[i] + x[i]));
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    };
+    let mut errors: Vec<f64> = reference.iter().zip(mean).map(of_pixel).collect();
+    if reference.len() != mean.len() || errors.is_empty() {
+        return None;
+    }
+    errors.sort_by(f64::total_cmp);
+    let kept = errors.len() - errors.len() / 1000;
+    let mean_of = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+    Some(Error {
+        rel_mse: mean_of(&errors),
+        rel_mse_999: mean_of(&errors[..kept]),
+        luminance: luminance(mean) / luminance(reference),
+    })
+}
+
+fn rows(tallies: &[Tally]) -> Vec<Row> {
+    let base = tallies.first().map(|tally| tally.frame.spread()).unwrap_or_default();
+    let row = |(variant, tally): (&Variant, &Tally)| {
+        let [first, last] = tally.shadow_rays.map(|rays| rays as f64);
+        Row {
+            settings: variant.name,
+            frame_ms: tally.frame.spread(),
+            passes_ms: PASSES.iter().zip(&tally.passes).map(|(pass, ms)| (pass.0, ms.spread())).collect(),
+            ratio: tally.frame.spread().over(&base),
+            shadow_rays_share: (first > 0.0).then(|| last / first),
+            error: tally.error,
+        }
+    };
+    VARIANTS.iter().zip(tallies).map(row).collect()
+}
+
+fn time_table(title: &str, rows: &[Row]) -> Table {
+    let passes = PASSES.map(|(name, _)| name);
+    let head: Vec<&str> = ["settings", "frame", "ratio"].into_iter().chain(passes).collect();
+    let mut table = Table::new(format!("Hybrid, device ms: {title}"), &head);
+    for row in rows {
+        let of_frame = [row.settings.to_owned(), row.frame_ms.to_string(), times(row.ratio)];
+        let of_passes = row.passes_ms.iter().map(|(_, ms)| ms.to_string());
+        table.row(of_frame.into_iter().chain(of_passes).collect());
+    }
+    table.note("A frame is one sample a pixel; the first of each picture does not count.");
+    table
+}
+
+fn error_table(title: &str, rows: &[Row]) -> Table {
+    let head = ["settings", "relMSE", "without the worst 0.1 %", "mean luminance", "shadow rays traced"];
+    let mut table = Table::new(format!("Hybrid, error: {title}"), &head);
+    for row in rows {
+        let Error { rel_mse, rel_mse_999, luminance } = row.error;
+        let share = row.shadow_rays_share.map_or_else(String::new, |share| format!("{:.1} %", share * 100.0));
+        table.row(vec![
+            row.settings.to_owned(),
+            format!("{rel_mse:.4}"),
+            format!("{rel_mse_999:.4}"),
+            format!("{luminance:.4}"),
+            share,
+        ]);
+    }
+    table.note("relMSE: mean of (x - r)^2 / (r^2 + 0.01); luminance by that of the reference.");
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_wrong_pixel_of_a_thousand_is_the_worst() {
+        let reference = vec![[1.0; 3]; 1000];
+        let mut mean = vec![[1.1; 3]; 1000];
+        mean[7] = [11.0; 3];
+        let error = error_of(&reference, &mean).unwrap_or_default();
+        assert!((error.rel_mse_999 - 0.01 / 1.01).abs() < 1e-6, "{error:?}");
+        assert!((error.rel_mse - (0.999 * 0.01 + 0.1) / 1.01).abs() < 1e-6, "{error:?}");
+        assert!((error.luminance - 1.1099).abs() < 1e-6, "{error:?}");
+        assert!(error_of(&reference, &mean[1..]).is_none() && error_of(&[], &[]).is_none());
+    }
+}

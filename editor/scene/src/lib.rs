@@ -8,6 +8,7 @@ mod audit;
 mod changes;
 mod document;
 mod edit;
+mod foreign;
 mod ids;
 pub mod import;
 mod node;

@@ -11,6 +11,8 @@ mod animation;
 mod changes;
 mod common;
 mod edits;
+mod export;
+mod export_edits;
 mod gltf_file;
 mod import;
 mod lobes;

@@ -139,7 +139,8 @@ fn a_view_of_another_size_goes_on_with_its_light() {
         studio.view_mut().resize(extent);
         studio.frames(1);
         let resized = rel_mse(&studio.read_frame(), &reference);
-        let what = format!("{extent:?}: relMSE {first:.4}, later {later:.4}, after another size {resized:.4}");
+        let what =
+            format!("{extent:?}: relMSE {first:.4}, later {later:.4}, after another size {resized:.4}");
         println!("{what}");
         assert!(resized < 0.5 * (first + later), "{what}");
     }

@@ -8,6 +8,7 @@ use caustica_scene::{Document, Exported, Local, Mesh, Target, export};
 use serde_json::Value;
 
 use crate::common::{assert_sound, assets};
+use crate::export_edits::samples;
 
 /// A document that places a file as it is.
 pub fn placed(imported: Imported) -> Document {
@@ -155,7 +156,10 @@ fn the_khronos_validator_finds_no_error() {
         let name = format!("{number}-{}", name_of(number, model));
         exported(&placed(read(model)), folder.path(), &name).0
     };
-    let files: Vec<PathBuf> = models.iter().enumerate().map(export_one).collect();
+    let mut files: Vec<PathBuf> = models.iter().enumerate().map(export_one).collect();
+    for (number, document) in samples(folder.path()).iter().enumerate() {
+        files.push(exported(document, folder.path(), &format!("sample-{number}.glb")).0);
+    }
     let output =
         Command::new("node").args(["-e", include_str!("validate.js"), "--"]).args(&files).output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout);

@@ -4,17 +4,18 @@ use std::path::Path;
 
 use caustica_scene::import::Warning;
 use caustica_scene::{
-    Cloud, Document, Edit, Environment, Light, LightKind, Local, Material, MaterialEntry, MaterialId, Node,
-    NodeId, NodeKind, ShadingMode, ShapeSource, Target, Trs, export,
+    Camera, Cloud, Document, Edit, Environment, Light, LightKind, Local, Material, MaterialEntry, MaterialId,
+    Node, NodeId, NodeKind, Projection, ShapeSource, Target, Trs, export,
 };
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use crate::common::{ARM, LAMP, PLATE, Scene, assets, scene, trs};
 use crate::export::{exported, json_of, placed, read, worlds};
+use crate::export_materials::full_material;
 use crate::gltf_file::{GltfFile, SQUARE};
 
-fn apply(document: &mut Document, edit: Edit) {
+pub fn apply(document: &mut Document, edit: Edit) {
     document.apply(edit).unwrap();
 }
 
@@ -24,7 +25,7 @@ fn add_group(document: &mut Document, name: &str, parent: Option<NodeId>, local:
     id
 }
 
-fn add_material(document: &mut Document, value: Material) -> MaterialId {
+pub fn add_material(document: &mut Document, value: Material) -> MaterialId {
     let material = MaterialId(document.allocate_id());
     apply(document, Edit::AddMaterial { material, entry: Box::new(MaterialEntry { value, original: None }) });
     material
@@ -284,43 +285,26 @@ fn two_sources_do_not_mix_what_is_not_known() {
     assert_eq!(second, &json!({"material": 3, "variants": [3]}), "numbered after those of the first");
 }
 
-#[test]
-fn shading_modes_come_back() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut scene = scene(folder.path());
-    let target = scene.part(PLATE);
-    let glass = Material {
-        mode: ShadingMode::Refractive,
-        transmission: 1.0,
-        roughness: 0.0,
-        metallic: 0.0,
-        has_volume: true,
-        ior: 1.52,
-        attenuation_distance_m: Some(0.1),
-        volume_priority: 7,
-        ..Material::default()
-    };
-    let cases = [
-        Material { mode: ShadingMode::Reflective, roughness: 0.4, ..Material::default() },
-        Material { mode: ShadingMode::Refractive, ior: 2.417, ..Material::default() },
-        Material { mode: ShadingMode::Pbr, ..glass.clone() },
-        Material { mode: ShadingMode::Unlit, ..Material::default() },
-        glass,
-    ];
-    for case in cases {
-        let material = add_material(&mut scene.document, case.clone());
-        apply(&mut scene.document, Edit::AssignMaterial { target, primitive: 0, material });
-        let (path, _) = exported(&scene.document, folder.path(), "modes.glb");
-        let again = read(&path).materials.pop().unwrap();
-        assert_eq!((again.mode, again.ior), (case.mode, case.ior));
-        assert_eq!((again.volume_priority, again.has_volume), (case.volume_priority, case.has_volume));
-        if case.mode == ShadingMode::Reflective {
-            assert_eq!((again.metallic, again.roughness), (1.0, 0.0), "a mirror in other programs too");
-        }
-        if case.mode == ShadingMode::Refractive {
-            assert!(again.transmission == 1.0 && again.metallic == 0.0, "glass in other programs too");
-        }
-    }
+/// Scenes that no shared model is like, for the validator.
+pub fn samples(folder: &Path) -> Vec<Document> {
+    let (full, _) = full_material(folder);
+    let mut moved = edited(folder).document;
+    let mesh = moved.meshes().next().unwrap().0;
+    let mesh_from_primitive = DAffine3::from_translation(DVec3::Z);
+    apply(&mut moved, Edit::SetPrimitiveTransform { mesh, primitive: 0, mesh_from_primitive });
+    let sphere = ShapeSource::Sphere { centre: Vec3::Y, radius_m: 0.5 };
+    let (_, edit) = moved.add_shapes_edit("ball", sphere, &[], trs(1.0, 1.0, 1.0)).unwrap();
+    apply(&mut moved, edit);
+    let (_, edit) =
+        moved.add_shapes_edit("dust", ShapeSource::Cloud(Cloud::default()), &[], Local::default()).unwrap();
+    apply(&mut moved, edit);
+    let camera = Camera { projection: Projection::Orthographic { ymag_m: 2.0 }, ..Camera::default() };
+    let (_, edit) = moved.add_edit(Node::new("parallel", NodeKind::Camera(camera)), None);
+    apply(&mut moved, edit);
+    let strange_folder = folder.join("strange");
+    std::fs::create_dir(&strange_folder).unwrap();
+    strange(&strange_folder, "packet");
+    vec![placed(full), moved, placed(read(&strange_folder.join("file.gltf"))), Document::new()]
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod common;
 mod edits;
 mod export;
 mod export_edits;
+mod export_materials;
 mod gltf_file;
 mod import;
 mod lobes;

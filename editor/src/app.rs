@@ -17,6 +17,7 @@ pub mod actions;
 mod adaptive;
 mod dispatch;
 pub mod editor;
+mod export;
 mod files;
 mod window;
 

@@ -8,17 +8,22 @@ macro_rules! say {
 mod bench;
 mod check;
 mod devices;
+mod export;
 mod output;
 mod render;
 
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use caustica_renderer::RendererError;
 use caustica_renderer::gpu::{Device, DeviceOptions, GpuError, Instance, InstanceOptions, Requirements};
+use caustica_scene::import::Warning;
+use caustica_scene::{Document, Local, ShapeSource};
 use clap::{Args, Parser, Subcommand};
+
+use crate::session::{Loaded, load};
 
 /// Scene editor with a hybrid Vulkan ray-tracing renderer. Without a subcommand the editor opens.
 #[derive(Parser, Debug)]
@@ -41,6 +46,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Audit a project or model: structure and numbers; exit code 1 on errors
     Check(check::CheckArgs),
+    /// Write a project or model as .glb or .gltf
+    Export(export::ExportArgs),
     /// List the Vulkan devices, what each lacks, and which one is chosen; or measure one
     Devices(devices::DevicesArgs),
     /// Measure what scenes, edits and acceleration structures cost here
@@ -94,6 +101,7 @@ pub fn run() -> ExitCode {
     let result = match cli.command {
         Some(Command::Render(args)) => logged(|| render::run(&args, &cli.device, cli.shaders.clone())),
         Some(Command::Check(args)) => logged(|| check::run(&args)),
+        Some(Command::Export(args)) => logged(|| export::run(&args)),
         Some(Command::Devices(args)) => logged(|| devices::run(&args, &cli.device)),
         Some(Command::Bench(args)) => logged(|| bench::run(&args, &cli.device, cli.shaders.clone())),
         None => match cli.file.as_ref().filter(|file| !file.exists()) {
@@ -122,6 +130,29 @@ fn demo_project() -> Option<PathBuf> {
     const DEMO: &str = "projects/gallery/gallery.caustica.json";
     let folders = [PathBuf::from("."), PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))];
     folders.into_iter().map(|folder| folder.join(DEMO)).find(|file| file.is_file())
+}
+
+/// The scene of a file, with what was left out or repaired on reading.
+fn document_of(file: &Path) -> anyhow::Result<(Document, Vec<Warning>)> {
+    let mut document = Document::new();
+    let warnings = match load(file, &|_, _| {})? {
+        Loaded::Project(project) => return Ok((project.document, project.warnings)),
+        Loaded::Model(imported) => {
+            let warnings = imported.warnings.clone();
+            let prefab = document.add_imported(*imported)?;
+            let (_, place) = document.instantiate_edit(prefab, None, Local::default());
+            document.apply(place)?;
+            warnings
+        }
+        Loaded::Shapes(shapes) => {
+            let source = ShapeSource::File(shapes);
+            let (_, edit) = document.add_shapes_edit("shapes", source, &[], Local::default())?;
+            document.apply(edit)?;
+            Vec::new()
+        }
+        Loaded::Environment(..) => anyhow::bail!("{}: an environment has no scene", file.display()),
+    };
+    Ok((document, warnings))
 }
 
 /// What `say!` does.

@@ -17,6 +17,8 @@ pub const MODEL_ENDINGS: [&str; 3] = ["gltf", "glb", "obj"];
 pub const SHAPE_ENDINGS: [&str; 3] = ["xyz", "csv", "txt"];
 /// Endings of environment images.
 pub const ENVIRONMENT_ENDINGS: [&str; 2] = ["hdr", "exr"];
+/// Endings of what can be exported; the first where none was typed.
+pub const EXPORT_ENDINGS: [&str; 2] = ["glb", "gltf"];
 /// Ending of projects.
 pub const PROJECT_ENDING: &str = "caustica.json";
 
@@ -31,6 +33,8 @@ pub enum Wish {
     Environment,
     /// Where to write the project.
     SaveAs,
+    /// Where to write the scene as glTF.
+    Export,
 }
 
 impl Wish {
@@ -40,6 +44,7 @@ impl Wish {
             Self::Import => "Import a model",
             Self::Environment => "Choose an environment image",
             Self::SaveAs => "Save the project as",
+            Self::Export => "Export the scene as glTF",
         }
     }
 
@@ -49,6 +54,7 @@ impl Wish {
             Self::Import => ("Models", [MODEL_ENDINGS, SHAPE_ENDINGS].concat()),
             Self::Environment => ("Environments", ENVIRONMENT_ENDINGS.to_vec()),
             Self::SaveAs => ("Caustica projects", vec!["json"]),
+            Self::Export => ("glTF", EXPORT_ENDINGS.to_vec()),
         }
     }
 }
@@ -142,7 +148,7 @@ fn ask_portal(wish: Wish, folder: Option<&Path>, file_name: &str) -> Option<Path
         dialog = dialog.set_directory(folder);
     }
     match wish {
-        Wish::SaveAs => dialog.set_file_name(file_name).save_file(),
+        Wish::SaveAs | Wish::Export => dialog.set_file_name(file_name).save_file(),
         _ => dialog.pick_file(),
     }
 }
@@ -160,14 +166,19 @@ fn own_dialog(wish: Wish, folder: Option<&Path>, file_name: &str) -> FileDialog 
         dialog = dialog.initial_directory(folder.to_path_buf());
     }
     match wish {
-        Wish::SaveAs => dialog.save_file(),
+        Wish::SaveAs | Wish::Export => dialog.save_file(),
         _ => dialog.pick_file(),
     }
     dialog
 }
 
-/// A project's name ends as projects do, whatever was typed.
+/// What is written has a name that ends as its kind does, whatever was typed.
 fn with_ending(wish: Wish, path: PathBuf) -> PathBuf {
+    if wish == Wish::Export && caustica_scene::ExportFormat::of(&path).is_none() {
+        let mut name = path.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".{}", EXPORT_ENDINGS[0]));
+        return path.with_file_name(name);
+    }
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     if wish != Wish::SaveAs || name.to_lowercase().ends_with(".caustica.json") {
         return path;
@@ -186,6 +197,8 @@ mod tests {
         assert_eq!(named(Wish::SaveAs, "room"), PathBuf::from("/a/room.caustica.json"));
         assert_eq!(named(Wish::SaveAs, "room.json"), PathBuf::from("/a/room.caustica.json"));
         assert_eq!(named(Wish::SaveAs, "room.caustica.json"), PathBuf::from("/a/room.caustica.json"));
+        assert_eq!(named(Wish::Export, "room.v2"), PathBuf::from("/a/room.v2.glb"));
+        assert_eq!(named(Wish::Export, "room.GLTF"), PathBuf::from("/a/room.GLTF"));
         assert_eq!(named(Wish::Open, "room.glb"), PathBuf::from("/a/room.glb"));
     }
 }

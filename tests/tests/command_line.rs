@@ -125,6 +125,34 @@ fn a_time_of_an_animation_can_be_rendered() {
     assert_eq!(run.code, Some(2), "{}", run.stderr);
 }
 
+#[test]
+fn a_model_is_exported_and_checked_as_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("moves.gltf"), cube(true)).expect("a model on disk");
+    let figures = json_of(&caustica(folder.path(), &["export", "moves.gltf", "-o", "out.glb", "--json"]));
+    assert_eq!(
+        (&figures["files"], &figures["warnings"]),
+        (&serde_json::json!(["out.glb"]), &serde_json::json!([]))
+    );
+    let check = |name: &str| {
+        let mut figures = json_of(&caustica(folder.path(), &["check", name, "--json"]));
+        figures.as_object_mut().expect("an object").remove("file");
+        figures
+    };
+    assert_eq!(check("moves.gltf"), check("out.glb"));
+    let run = caustica(folder.path(), &["export", "moves.gltf", "-o", "out.gltf"]);
+    assert!(run.code == Some(0) && folder.path().join("out.bin").is_file(), "{}", run.stderr);
+
+    for (output, code, reason) in [
+        ("out.obj", 2, ".glb or .gltf"),
+        ("moves.gltf", 1, "is a source"),
+        ("absent/a.glb", 1, "cannot be written"),
+    ] {
+        let run = caustica(folder.path(), &["export", "moves.gltf", "-o", output]);
+        assert!(run.code == Some(code) && run.stderr.contains(reason), "{:?} {}", run.code, run.stderr);
+    }
+}
+
 /// Reads an EXR written by the program: pixels and attributes as text.
 fn read_exr(path: &Path) -> (Vec<[f32; 3]>, String) {
     use exr::prelude::{ReadChannels, ReadLayers};

@@ -179,6 +179,11 @@ impl Document {
         self.prefabs.iter().map(|(id, prefab)| (*id, prefab))
     }
 
+    /// The prefab that a node instances.
+    pub(crate) fn prefab_of(&self, node: NodeId) -> Option<PrefabId> {
+        self.node(node)?.prefab()
+    }
+
     /// A mesh.
     pub fn mesh(&self, id: MeshId) -> Option<&Mesh> {
         self.meshes.get(&id)

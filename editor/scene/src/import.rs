@@ -10,11 +10,11 @@ use crate::prefab::Prefab;
 mod environment;
 mod error;
 pub(crate) mod geometry;
-mod gltf;
+pub(crate) mod gltf;
 mod image;
 mod obj;
 mod shapes;
-mod tangents;
+pub(crate) mod tangents;
 mod uri;
 
 pub use environment::load_environment;
@@ -114,6 +114,7 @@ pub(crate) fn placeholder_texture(name: String) -> Texture {
         srgb: true,
         sampler: Default::default(),
         placeholder: true,
+        encoded: None,
     }
 }
 

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::animation::Animation;
 use crate::assets::{Camera, Environment, Light};
+use crate::foreign::Foreign;
 use crate::ids::{MaterialId, MeshId, TextureId};
 use crate::node::RayVisibility;
 use crate::transform::Local;
@@ -117,6 +118,8 @@ pub struct Prefab {
     pub missing: bool,
     /// Its clips in the order of the file.
     pub animations: Vec<Arc<Animation>>,
+    /// What its file says and the program does not know.
+    pub(crate) foreign: Arc<Foreign>,
     nodes: Vec<PartNode>,
     subtree_end: Vec<u32>,
     segments: Vec<String>,

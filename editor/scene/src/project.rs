@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use crate::document::Document;
 use crate::import::{ImportOptions, Warning};
 
-mod atomic;
+pub(crate) mod atomic;
 mod paths;
 mod read;
 mod record;

@@ -51,6 +51,8 @@ pub enum Action {
     Save,
     /// Ask where to save.
     SaveAs,
+    /// Ask where to write the scene as glTF.
+    Export,
     /// End the program.
     Quit,
     /// Undo a step.
@@ -197,6 +199,7 @@ fn file() -> Vec<Command> {
         file(icon::DOWNLOAD_SIMPLE, "Import model\u{2026}", Action::Import, Some((CTRL, Key::I))),
         file(icon::FLOPPY_DISK, "Save", Action::Save, Some((CTRL, Key::S))),
         file(icon::FLOPPY_DISK_BACK, "Save as\u{2026}", Action::SaveAs, Some((CTRL_SHIFT, Key::S))),
+        file(icon::EXPORT, "Export\u{2026}", Action::Export, Some((CTRL, Key::E))),
         file(icon::SIGN_OUT, "Quit", Action::Quit, Some((CTRL, Key::Q))),
     ]
 }

@@ -29,6 +29,7 @@ impl Editor {
             Action::ImportPath(path) | Action::EnvironmentPath(path) => self.load(Purpose::Import, path),
             Action::Save => self.save(),
             Action::SaveAs => self.ask(Wish::SaveAs),
+            Action::Export => self.ask(Wish::Export),
             Action::Quit => self.guarded(Then::Quit),
             Action::Undo | Action::Redo => self.undo_or_redo(action == Action::Undo),
             Action::Duplicate => self.duplicate(),

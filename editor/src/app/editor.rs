@@ -10,6 +10,7 @@ use egui::{CentralPanel, Context, Frame, Id, Margin, Modal, Panel, Ui, WidgetTex
 use egui_dock::{DockArea, DockState, TabViewer};
 
 use super::actions::{self, Action};
+use super::export::Exporting;
 use super::files::Loading;
 use crate::dialogs::Dialogs;
 use crate::panels::{self, Cx, bars, overlays};
@@ -40,6 +41,7 @@ pub struct Editor {
     pub(super) dock: DockState<Tab>,
     pub(super) dialogs: Dialogs,
     pub(super) loading: Option<Loading>,
+    pub(super) exporting: Option<Exporting>,
     /// Files to import after the present one.
     pub(super) waiting: VecDeque<PathBuf>,
     /// The audit that is running, and the state of the document that it looks at.
@@ -68,6 +70,7 @@ impl Editor {
             dock,
             dialogs: Dialogs::default(),
             loading: None,
+            exporting: None,
             waiting: VecDeque::new(),
             audit: None,
             question: None,
@@ -126,6 +129,7 @@ impl Editor {
         let context = ui.ctx().clone();
         self.apply_theme(&context);
         self.poll_loading();
+        self.poll_exporting();
         self.play(Instant::now());
         self.keep_audited();
         self.take_keys(&context);
@@ -267,11 +271,16 @@ impl Editor {
         }
         let progress = self.loading.as_ref().map(|loading| (loading.label(), loading.progress()));
         if let Some((label, progress)) = progress
-            && overlays::progress(context, &self.state, &label, &progress)
+            && overlays::progress(context, &self.state, &label, &progress, true)
         {
             self.loading = None;
             self.waiting.clear();
             self.state.toasts.info("Cancelled.");
+        }
+        if self.loading.is_none()
+            && let Some((label, progress)) = self.exporting.as_ref().map(Exporting::progress)
+        {
+            overlays::progress(context, &self.state, &label, &progress, false);
         }
         overlays::palette(&mut self.state, context);
         overlays::help(&mut self.state, &self.session, context);

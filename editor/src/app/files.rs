@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::editor::{Editor, Then};
-use crate::dialogs::{ENVIRONMENT_ENDINGS, MODEL_ENDINGS, PROJECT_ENDING, SHAPE_ENDINGS, Wish};
+use crate::dialogs::{
+    ENVIRONMENT_ENDINGS, EXPORT_ENDINGS, MODEL_ENDINGS, PROJECT_ENDING, SHAPE_ENDINGS, Wish,
+};
 use crate::session::{self, Loaded};
 use crate::worker::{Answer, Job, Progress};
 
@@ -42,7 +44,11 @@ impl Editor {
             Some(path) => path.parent().map(Path::to_path_buf),
             None => None,
         };
-        let name = self.file_name();
+        let mut name = self.file_name();
+        if wish == Wish::Export {
+            let stem = [".caustica.json", ".json"].iter().find_map(|ending| name.strip_suffix(ending));
+            name = format!("{}.{}", stem.unwrap_or(&name), EXPORT_ENDINGS[0]);
+        }
         self.dialogs.ask(wish, folder.as_deref(), &name, &self.wake);
     }
 
@@ -66,6 +72,7 @@ impl Editor {
             Wish::Open => self.load(Purpose::Open, path),
             Wish::Import | Wish::Environment => self.load(Purpose::Import, path),
             Wish::SaveAs => self.save_to(&path),
+            Wish::Export => self.export_to(path),
         }
     }
 
@@ -157,7 +164,7 @@ impl Editor {
         Ok(())
     }
 
-    fn tell(&mut self, done: String, warnings: usize) {
+    pub(super) fn tell(&mut self, done: String, warnings: usize) {
         match warnings {
             0 => self.state.toasts.info(format!("{done}.")),
             1 => self.state.toasts.warning(format!("{done}, with one warning: see the log.")),
@@ -243,6 +250,6 @@ fn is_project(path: &Path) -> bool {
     path.to_string_lossy().to_lowercase().ends_with(".json")
 }
 
-fn short(path: &Path) -> String {
+pub(super) fn short(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use caustica_scene::{Document, Mesh, Severity, ShapeSource, audit};
+use caustica_scene::{Mesh, Severity, audit};
 use clap::Args;
 use serde_json::json;
 
-use super::EXIT_INPUT;
-use crate::session::{Loaded, load};
+use super::{EXIT_INPUT, document_of};
 
 /// Arguments of `caustica check`.
 #[derive(Args, Debug)]
@@ -22,31 +21,7 @@ pub(super) struct CheckArgs {
 
 /// Audits the file.
 pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
-    let (document, warnings) = match load(&args.file, &|_, _| {})? {
-        Loaded::Project(project) => (project.document, project.warnings),
-        Loaded::Model(imported) => {
-            let warnings = imported.warnings.clone();
-            let mut document = Document::new();
-            let prefab = document.add_imported(*imported)?;
-            let (_, place) = document.instantiate_edit(prefab, None, caustica_scene::Local::default());
-            document.apply(place)?;
-            (document, warnings)
-        }
-        Loaded::Shapes(file) => {
-            let mut document = Document::new();
-            let (_, edit) = document.add_shapes_edit(
-                "shapes",
-                ShapeSource::File(file),
-                &[],
-                caustica_scene::Local::default(),
-            )?;
-            document.apply(edit)?;
-            (document, Vec::new())
-        }
-        Loaded::Environment(..) => {
-            anyhow::bail!("{}: an environment has no scene to check", args.file.display())
-        }
-    };
+    let (document, warnings) = document_of(&args.file)?;
     let findings = audit(&document);
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
     let placed = |count: fn(&Mesh) -> usize| -> usize {

@@ -63,7 +63,13 @@ pub fn toasts(state: &mut UiState, context: &Context) {
 }
 
 /// How far a job is; true: the user cancels it.
-pub fn progress(context: &Context, state: &UiState, label: &str, progress: &Progress) -> bool {
+pub fn progress(
+    context: &Context,
+    state: &UiState,
+    label: &str,
+    progress: &Progress,
+    can_cancel: bool,
+) -> bool {
     let mut cancelled = false;
     let at = if state.view.rect.is_positive() {
         state.view.rect.center_top()
@@ -82,7 +88,7 @@ pub fn progress(context: &Context, state: &UiState, label: &str, progress: &Prog
                 ui.horizontal(|ui| {
                     ui.weak(&progress.step);
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                        cancelled = ui.button("Cancel").clicked();
+                        cancelled = can_cancel && ui.button("Cancel").clicked();
                     });
                 });
             });

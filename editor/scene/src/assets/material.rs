@@ -22,6 +22,18 @@ pub enum ShadingMode {
     Unlit,
 }
 
+impl ShadingMode {
+    /// How files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pbr => "pbr",
+            Self::Reflective => "reflective",
+            Self::Refractive => "refractive",
+            Self::Unlit => "unlit",
+        }
+    }
+}
+
 /// glTF alpha modes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -67,6 +67,8 @@ pub struct Texture {
     pub sampler: Sampler,
     /// True: the image could not be read and a checker stands in for it.
     pub placeholder: bool,
+    /// The PNG or JPEG that it was read from, for exports; `None`: there is none.
+    pub encoded: Option<Arc<[u8]>>,
 }
 
 /// A texture as a material uses it.

@@ -155,7 +155,7 @@ impl Document {
     }
 
     /// One material a primitive.
-    fn materials_of(&self, target: Target, mesh: &Mesh) -> Vec<MaterialId> {
+    pub(crate) fn materials_of(&self, target: Target, mesh: &Mesh) -> Vec<MaterialId> {
         (0..).zip(&mesh.primitives).map(|(index, p)| self.material_at(target, index, p.material)).collect()
     }
 

@@ -2,10 +2,13 @@
 //! In: a path. Out: [`Imported`]. The JSON is read by our own checked reader: node transforms stay in double
 //! precision, errors name a JSON pointer, and nothing is indexed before it was checked.
 
+use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::{ImportError, ImportOptions, Imported, Warning, file_stem, read_model_file};
 use crate::assets::Material;
+use crate::foreign::Foreign;
 use crate::prefab::Prefab;
 
 mod accessor;
@@ -14,12 +17,16 @@ mod attributes;
 pub(super) mod buffers;
 mod check;
 mod container;
+mod foreign;
 mod json;
 mod material;
 mod mesh;
 mod node;
 mod skin;
 mod texture;
+
+pub(crate) use material::{INFINITE_IOR, is_smooth_glass};
+pub(crate) use node::unit as unit_rotation;
 
 use json::{Fault, Item};
 
@@ -55,13 +62,14 @@ fn read(
     progress("reading meshes", 0.2);
     let mut textures = texture::TextureTable::read(&root)?;
     let (mut materials, material_warnings) = material::read_all(&root, &mut textures)?;
-    let meshes = mesh::read_all(&root, &accessors, &materials, options.max_elements)?;
+    let mut meshes = mesh::read_all(&root, &accessors, &materials, options.max_elements)?;
     if meshes.uses_default_material {
         materials.push(Material { name: "default".to_owned(), ..Material::default() });
     }
     let mut tree = node::read_scene(&root, &accessors, &meshes.list)?;
     let skins = skin::read_all(&root, &accessors, &meshes.list, &mut tree)?;
     let animations = animation::read_all(&root, &accessors, &meshes.list, &mut tree)?;
+    let foreign = foreign::read(&root, &mut meshes, &mut tree)?;
     progress("decoding images", 0.5);
     let (textures, image_warnings) =
         textures.load(&root, &buffers, &views, folder, options.max_image_extent_px)?;
@@ -70,25 +78,28 @@ fn read(
     prefab.animations = animations;
     prefab.set_skins(skins);
     prefab.set_nodes(tree.parts).map_err(|error| Fault::new("/nodes", error.to_string()))?;
-    let faults = left_out_warnings(&root, &left_out)?
+    let faults = left_out_warnings(&root, &left_out, &foreign)?
         .into_iter()
         .chain(material_warnings)
         .chain(meshes.warnings)
         .chain(tree.warnings)
         .chain(image_warnings);
-    let warnings = faults
+    let warnings: Vec<Warning> = faults
         .map(|fault| Warning { file: path.to_owned(), place: fault.place, message: fault.reason })
         .collect();
+    prefab.foreign = Arc::new(foreign);
     progress("done", 1.0);
     Ok(Imported { prefab, meshes: meshes.list, materials, textures, warnings })
 }
 
 /// What the file has and the program does not show.
-fn left_out_warnings(root: &Item<'_>, extensions: &[String]) -> Result<Vec<Fault>, Fault> {
-    let mut warnings: Vec<Fault> = extensions
-        .iter()
-        .map(|name| Fault::new("/extensionsUsed", format!("{name} is not supported and is left out")))
-        .collect();
+fn left_out_warnings(root: &Item<'_>, extensions: &[String], foreign: &Foreign) -> Result<Vec<Fault>, Fault> {
+    let kept: BTreeSet<&String> = foreign.all().flat_map(|object| object.extensions.keys()).collect();
+    let warning = |name: &String| {
+        let what = if kept.contains(name) { "is only kept for exports" } else { "is left out" };
+        Fault::new("/extensionsUsed", format!("{name} is not supported and {what}"))
+    };
+    let mut warnings: Vec<Fault> = extensions.iter().map(warning).collect();
     if root.extension("KHR_materials_variants")?.is_some() {
         let message = "of the material variants the default one is shown";
         warnings.push(Fault::new("/extensions/KHR_materials_variants", message));

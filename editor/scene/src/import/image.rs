@@ -17,12 +17,14 @@ pub(super) struct Pixels {
     pub height: u32,
     pub rgba8: Arc<[u8]>,
     pub placeholder: bool,
+    /// The file that they were read from.
+    pub encoded: Option<Arc<[u8]>>,
 }
 
 /// Decodes a PNG or JPEG; deeper channels are reduced to 8 bits.
-pub(super) fn decode(bytes: &[u8], max_extent_px: u32) -> Result<Pixels, String> {
+pub(super) fn decode(bytes: Vec<u8>, max_extent_px: u32) -> Result<Pixels, String> {
     let mut reader =
-        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+        ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(|error| error.to_string())?;
     match reader.format() {
         Some(ImageFormat::Png | ImageFormat::Jpeg) => {}
         Some(other) => return Err(format!("{other:?} images are not supported here")),
@@ -40,7 +42,8 @@ pub(super) fn decode(bytes: &[u8], max_extent_px: u32) -> Result<Pixels, String>
     if width == 0 || height == 0 {
         return Err("it has no texels".to_owned());
     }
-    Ok(Pixels { width, height, rgba8: image.into_raw().into(), placeholder: false })
+    let encoded = Some(bytes.into());
+    Ok(Pixels { width, height, rgba8: image.into_raw().into(), placeholder: false, encoded })
 }
 
 /// A checker in magenta and black, seen at once.
@@ -54,5 +57,6 @@ pub(super) fn placeholder() -> Pixels {
         height: CHECKER_PX,
         rgba8: (0..CHECKER_PX * CHECKER_PX).flat_map(texel).collect(),
         placeholder: true,
+        encoded: None,
     }
 }

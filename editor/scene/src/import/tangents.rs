@@ -6,9 +6,11 @@ use glam::{Vec2, Vec3, Vec4};
 
 /// Square of the length below which a vector has no direction.
 const SHORTEST_SQUARED: f64 = 1e-24;
+/// A square of the length this close to 1 is that of a unit vector in single precision.
+const UNIT_ROUNDING: f64 = 2.5e-7;
 
 /// A tangent that completes an orthonormal frame: Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
-pub(super) fn any(normal: Vec3) -> Vec4 {
+pub(crate) fn any(normal: Vec3) -> Vec4 {
     let sign = 1.0_f32.copysign(normal.z);
     let a = -1.0 / (sign + normal.z);
     let b = normal.x * normal.y * a;
@@ -16,9 +18,13 @@ pub(super) fn any(normal: Vec3) -> Vec4 {
 }
 
 /// The vector at unit length; `None` when it has no direction. In double precision, because the square of a
-/// large finite number is not finite in single precision.
+/// large finite number is not finite in single precision. A unit vector stays as it is, bit for bit: what was
+/// exported comes back the same.
 pub(super) fn unit(vector: Vec3) -> Option<Vec3> {
     let wide = vector.as_dvec3();
+    if (wide.length_squared() - 1.0).abs() <= UNIT_ROUNDING {
+        return Some(vector);
+    }
     let usable = wide.is_finite() && wide.length_squared() > SHORTEST_SQUARED;
     usable.then(|| wide.normalize().as_vec3())
 }

@@ -148,6 +148,7 @@ pub fn imported(body: MeshData) -> Imported {
         srgb: true,
         sampler: Sampler::default(),
         placeholder: false,
+        encoded: None,
     };
     let textured =
         Material { base_color_texture: Some(TextureUse::new(TextureId(0))), ..Material::default() };

@@ -14,6 +14,8 @@ const BASE: [&str; 6] = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOOR
 const MORPHED: [&str; 3] = ["POSITION", "NORMAL", "TANGENT"];
 /// Most sets of four joints that are looked at; glTF knows no limit.
 const MAX_JOINT_SETS: usize = 16;
+/// A sum of weights this close to 1 is 1 but for rounding, and they are left as they are, bit for bit.
+const SUM_ROUNDING: f64 = 2e-7;
 
 /// Which accessors a primitive names: of the base (0) and of each morph target (1 and on).
 type Key = Vec<(usize, String, usize)>;
@@ -255,6 +257,7 @@ fn strongest(mut holds: Vec<(u32, f32)>) -> Hold {
     holds.sort_by(|(_, a), (_, b)| b.total_cmp(a));
     holds.truncate(4);
     let sum: f64 = holds.iter().map(|(_, weight)| f64::from(*weight)).sum();
+    let sum = if (sum - 1.0).abs() <= SUM_ROUNDING { 1.0 } else { sum };
     let (mut joints, mut weights) = ([0; 4], [0.0; 4]);
     for ((to_joint, to_weight), (joint, weight)) in joints.iter_mut().zip(&mut weights).zip(holds) {
         (*to_joint, *to_weight) = (joint as u16, (f64::from(weight) / sum) as f32);

@@ -35,6 +35,11 @@ const COMPRESSION: &[&str] = &[
     "KHR_texture_basisu",
 ];
 
+/// Whether an extension is read, so that an export writes it from what the document says.
+pub(super) fn is_read(name: &str) -> bool {
+    SUPPORTED.contains(&name) && name != "KHR_xmp_json_ld"
+}
+
 /// Number of entries in the lists of a file.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {

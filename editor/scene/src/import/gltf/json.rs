@@ -42,6 +42,11 @@ impl<'a> Item<'a> {
         Fault::new(format!("{}/{key}", self.place), reason)
     }
 
+    /// The value as it stands in the file.
+    pub fn value(&self) -> &'a Value {
+        self.value
+    }
+
     /// The members of this object.
     pub fn object(&self) -> Result<&'a Map<String, Value>, Fault> {
         self.value
@@ -53,6 +58,11 @@ impl<'a> Item<'a> {
     pub fn get(&self, key: &str) -> Option<Item<'a>> {
         let value = self.value.as_object()?.get(key)?;
         Some(Item { value, place: format!("{}/{}", self.place, key.replace('~', "~0").replace('/', "~1")) })
+    }
+
+    /// A member as it stands in the file; `None` when it is absent.
+    pub fn raw(&self, key: &str) -> Option<&'a Value> {
+        self.value.as_object()?.get(key)
     }
 
     /// A member that has to be an object, if it is there.

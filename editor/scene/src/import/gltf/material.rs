@@ -19,7 +19,7 @@ const SMOOTH_ROUGHNESS: f32 = 0.05;
 /// Emissive strength is cut here, far above every real light, so that a sum of samples stays finite.
 const MAX_EMISSIVE_STRENGTH: f32 = 1e15;
 /// Stands for an infinite index of refraction: all light is reflected.
-const INFINITE_IOR: f32 = 1e6;
+pub(crate) const INFINITE_IOR: f32 = 1e6;
 
 /// Share of something.
 const UNIT: RangeInclusive<f32> = 0.0..=1.0;
@@ -200,13 +200,28 @@ fn read_alpha(item: &Item<'_>) -> Result<AlphaMode, Fault> {
     })
 }
 
-/// Smooth glass without further lobes has a mode of its own, with the exact Fresnel equations.
-fn shading_mode(item: &Item<'_>, material: &Material) -> Result<ShadingMode, Fault> {
+/// What `extras.shadingMode` of an exported material says where the rest would be read as another mode.
+fn mode_of_name(name: &str) -> Option<ShadingMode> {
+    [ShadingMode::Pbr, ShadingMode::Reflective, ShadingMode::Refractive]
+        .into_iter()
+        .find(|mode| mode.name() == name)
+}
+
+/// Whether a material with these values is smooth glass, which has a mode of its own with the exact Fresnel equations.
+pub(crate) fn is_smooth_glass(material: &Material) -> bool {
     let smooth = material.roughness <= SMOOTH_ROUGHNESS && material.metallic_roughness_texture.is_none();
     let evenly_clear = material.transmission > GLASS_TRANSMISSION && material.transmission_texture.is_none();
+    evenly_clear && smooth && !material.has_scattering_lobe()
+}
+
+/// Smooth glass is told by its values, the rest by name.
+fn shading_mode(item: &Item<'_>, material: &Material) -> Result<ShadingMode, Fault> {
+    let named = item.get("extras").and_then(|extras| extras.text("shadingMode").ok().flatten());
     Ok(if item.extension("KHR_materials_unlit")?.is_some() {
         ShadingMode::Unlit
-    } else if evenly_clear && smooth && !material.has_scattering_lobe() {
+    } else if let Some(named) = named.and_then(mode_of_name) {
+        named
+    } else if is_smooth_glass(material) {
         ShadingMode::Refractive
     } else {
         ShadingMode::Pbr

@@ -1,7 +1,7 @@
 //! Meshes: accessors to attributes, any triangle topology to lists, then the mesh builder.
 //! In: JSON and checked accessors. Out: meshes and what was repaired. Points and lines are left out.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
@@ -10,12 +10,16 @@ use super::accessor::Accessors;
 use super::attributes::AttributeReader;
 use super::json::{Fault, Item};
 use crate::assets::{Material, Mesh};
+use crate::foreign::Mapping;
 use crate::ids::MaterialId;
 
 /// All meshes, and whether a primitive asked for the default material.
+#[derive(Default)]
 pub(super) struct Meshes {
     pub list: Vec<Mesh>,
     pub uses_default_material: bool,
+    /// What variants of materials choose, by mesh and primitive.
+    pub variants: BTreeMap<(usize, usize), Vec<Mapping>>,
     pub warnings: Vec<Fault>,
 }
 
@@ -29,10 +33,9 @@ pub(super) fn read_all(
     let items = root.objects("meshes")?;
     let results: Vec<Result<OneMesh, Fault>> =
         items.par_iter().map(|item| read(item, accessors, materials, max_elements)).collect();
-    let mut meshes =
-        Meshes { list: Vec::with_capacity(items.len()), uses_default_material: false, warnings: Vec::new() };
+    let mut meshes = Meshes { list: Vec::with_capacity(items.len()), ..Meshes::default() };
     let mut elements = 0_usize;
-    for (result, item) in results.into_iter().zip(&items) {
+    for (number, (result, item)) in results.into_iter().zip(&items).enumerate() {
         let one = result?;
         elements =
             elements.saturating_add(one.mesh.data.positions.len()).saturating_add(one.mesh.triangle_count());
@@ -41,6 +44,8 @@ pub(super) fn read_all(
         }
         meshes.uses_default_material |= one.uses_default_material;
         meshes.warnings.extend(one.warnings);
+        let variants = one.variants.into_iter().map(|(primitive, choice)| ((number, primitive), choice));
+        meshes.variants.extend(variants);
         meshes.list.push(one.mesh);
     }
     Ok(meshes)
@@ -49,6 +54,7 @@ pub(super) fn read_all(
 struct OneMesh {
     mesh: Mesh,
     uses_default_material: bool,
+    variants: Vec<(usize, Vec<Mapping>)>,
     warnings: Vec<Fault>,
 }
 
@@ -68,6 +74,7 @@ fn read(
     let mut uses_default_material = false;
     let mut corners = 0_usize;
     let mut target_counts = BTreeSet::new();
+    let (mut variants, mut kept) = (Vec::new(), 0);
     for primitive in item.objects("primitives")? {
         target_counts.insert(primitive.items("targets")?.len());
         let mode = primitive.size("mode")?.unwrap_or(4);
@@ -101,7 +108,12 @@ fn read(
             .map_err(|_| primitive.fault("the mesh has more vertices than 32 bits can count"))?;
         if !added {
             warnings.push(primitive.fault("no triangle with an area is left; it was left out"));
+            continue;
         }
+        if let Some(extension) = primitive.extension("KHR_materials_variants")? {
+            variants.push((kept, read_mappings(&extension, materials.len())?));
+        }
+        kept += 1;
     }
     warnings.extend(repair_warnings(item, &builder.repairs));
     if target_counts.len() > 1 {
@@ -114,7 +126,19 @@ fn read(
     if let Some(weights) = read_weights(item, mesh.data.morph.len(), &mut warnings)? {
         mesh.default_weights = weights;
     }
-    Ok(OneMesh { mesh, uses_default_material, warnings })
+    Ok(OneMesh { mesh, uses_default_material, variants, warnings })
+}
+
+/// What variants of materials choose for a primitive.
+fn read_mappings(extension: &Item<'_>, materials: usize) -> Result<Vec<Mapping>, Fault> {
+    let mapping = |item: &Item<'_>| {
+        Ok(Mapping {
+            material: item.required_index("material", materials, "material")?,
+            // Checked with the other references.
+            variants: item.indices("variants", usize::MAX, "variant")?,
+        })
+    };
+    extension.objects("mappings")?.iter().map(mapping).collect()
 }
 
 /// Weights of `count` morph targets, of a mesh or a node; `None` when it has none.

@@ -1,6 +1,8 @@
 //! The node tree with lights and cameras, in double precision.
 //! In: JSON of the chosen scene. Out: parts in depth-first order. Deep trees are walked without recursion.
 
+use std::collections::BTreeMap;
+
 use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
 
 use super::accessor::Accessors;
@@ -12,9 +14,9 @@ use crate::prefab::PartNode;
 use crate::transform::{Local, Trs};
 
 /// Radius of point and spot lights whose file gives none, metres: hard shadows, as other programs show them.
-const DEFAULT_LIGHT_RADIUS_M: f32 = 0.0;
+const DEFAULT_LIGHT_RADIUS_M: f64 = 0.0;
 /// Full angle of directional lights whose file gives none, degrees: hard shadows likewise.
-const DEFAULT_SUN_ANGLE_DEG: f32 = 0.0;
+const DEFAULT_SUN_ANGLE_DEG: f64 = 0.0;
 /// Most parts that one file may bring, GPU instances counted.
 const MAX_PARTS: usize = 4_000_000;
 /// Nearest distance drawn by cameras whose file gives none that can be used, metres.
@@ -29,20 +31,18 @@ pub(super) struct Tree {
     /// Index of the part that a node of the file became; `None` when the scene does not have it.
     pub part_of_node: Vec<Option<u32>>,
     pub environment: Option<Environment>,
+    /// How many GPU instances follow a part that has some.
+    pub instanced: BTreeMap<u32, u32>,
     pub warnings: Vec<Fault>,
 }
 
 /// Reads the default scene, else the first, else all nodes.
 pub(super) fn read_scene(root: &Item<'_>, accessors: &Accessors<'_>, meshes: &[Mesh]) -> Result<Tree, Fault> {
     let nodes = root.objects("nodes")?;
-    let scenes = root.objects("scenes")?;
-    let scene = match root.index("scene", scenes.len(), "scene")? {
-        Some(index) => scenes.get(index),
-        None => scenes.first(),
-    };
+    let scene = chosen_scene(root)?;
     let children: Vec<Vec<usize>> =
         nodes.iter().map(|node| node.indices("children", nodes.len(), "node")).collect::<Result<_, _>>()?;
-    let roots = match scene {
+    let roots = match &scene {
         Some(scene) => scene.indices("nodes", nodes.len(), "node")?,
         None => roots_of(&children),
     };
@@ -56,7 +56,7 @@ pub(super) fn read_scene(root: &Item<'_>, accessors: &Accessors<'_>, meshes: &[M
         cameras: root.objects("cameras")?,
     };
     let mut tree =
-        Tree { environment: scene.map(read_environment).transpose()?.flatten(), ..Tree::default() };
+        Tree { environment: scene.as_ref().map(read_environment).transpose()?.flatten(), ..Tree::default() };
     tree.part_of_node = vec![None; nodes.len()];
     let mut stack: Vec<(usize, Option<u32>)> = roots.iter().rev().map(|&n| (n, None)).collect();
     let mut seen = vec![false; nodes.len()];
@@ -76,6 +76,13 @@ pub(super) fn read_scene(root: &Item<'_>, accessors: &Accessors<'_>, meshes: &[M
         stack.extend(below.map(|&child| (child, Some(part))));
     }
     Ok(tree)
+}
+
+/// The default scene, else the first.
+pub(super) fn chosen_scene<'a>(root: &Item<'a>) -> Result<Option<Item<'a>>, Fault> {
+    let mut scenes = root.objects("scenes")?;
+    let index = root.index("scene", scenes.len(), "scene")?.unwrap_or(0);
+    Ok((index < scenes.len()).then(|| scenes.swap_remove(index)))
 }
 
 fn roots_of(children: &[Vec<usize>]) -> Vec<usize> {
@@ -153,6 +160,9 @@ impl Reader<'_> {
             skin: None,
             weights: weights.clone(),
         });
+        if let Some(instances) = &instances {
+            tree.instanced.insert(part, instances.len() as u32);
+        }
         for local in instances.into_iter().flatten() {
             tree.parts.push(PartNode {
                 parent: Some(part),
@@ -214,7 +224,7 @@ impl Reader<'_> {
 }
 
 /// `None` for a rotation without direction.
-fn unit(rotation: DQuat) -> Option<DQuat> {
+pub(crate) fn unit(rotation: DQuat) -> Option<DQuat> {
     let length2 = rotation.length_squared();
     if (length2 - 1.0).abs() <= UNIT_TOLERANCE {
         return Some(rotation);
@@ -249,12 +259,13 @@ fn read_local(item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Local, Fault
 }
 
 /// A number in `extras` of the light, else of the node that carries it.
-fn extra(light: &Item<'_>, node: &Item<'_>, key: &str, default: f32) -> Result<f32, Fault> {
+fn extra(light: &Item<'_>, node: &Item<'_>, key: &str, default: f64) -> Result<f64, Fault> {
     for owner in [light, node] {
         if let Some(extras) = owner.get("extras")
             && extras.get(key).is_some()
         {
-            return extras.f32_or(key, default).map(|value| value.max(0.0));
+            extras.f32_or(key, 0.0)?;
+            return extras.f64(key).map(|value| value.unwrap_or(default).max(0.0));
         }
     }
     Ok(default)
@@ -266,7 +277,7 @@ fn read_light(item: &Item<'_>, node: &Item<'_>) -> Result<Light, Fault> {
         Some(range) if range > 0.0 && (range as f32).is_finite() => Some(range as f32),
         _ => None,
     };
-    let radius = || extra(item, node, "radius", DEFAULT_LIGHT_RADIUS_M);
+    let radius = || extra(item, node, "radius", DEFAULT_LIGHT_RADIUS_M).map(|radius| radius as f32);
     let kind = match item.text("type")? {
         Some("point") => LightKind::Point { radius_m: radius()?, range_m },
         Some("spot") => {
@@ -287,7 +298,7 @@ fn read_light(item: &Item<'_>, node: &Item<'_>) -> Result<Light, Fault> {
         }
         Some("directional") => {
             let angle_deg = extra(item, node, "angle", DEFAULT_SUN_ANGLE_DEG)?.min(180.0);
-            LightKind::Directional { angular_radius_rad: angle_deg.to_radians() / 2.0 }
+            LightKind::Directional { angular_radius_rad: (angle_deg.to_radians() / 2.0) as f32 }
         }
         Some(other) => return Err(item.fault(format!("light type {other} does not exist"))),
         None => return Err(item.fault("\"type\" is missing")),
@@ -331,7 +342,11 @@ fn read_camera(item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Option<Came
     }
     let aspect = match projection {
         Projection::Perspective { .. } => optional(&lens, "aspectRatio")?,
-        Projection::Orthographic { ymag_m } => optional(&lens, "xmag")?.map(|xmag| xmag / ymag_m),
+        Projection::Orthographic { ymag_m } => {
+            // In double precision, so that an export can give the width that leads to the same quotient.
+            let xmag = optional(&lens, "xmag")?.and(lens.f64("xmag")?);
+            xmag.map(|xmag| (xmag / f64::from(ymag_m)) as f32)
+        }
     };
     Ok(Some(Camera {
         projection,

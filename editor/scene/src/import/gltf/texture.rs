@@ -82,7 +82,7 @@ impl TextureTable {
             .filter_map(|index| {
                 let image = images.get(index)?;
                 let pixels =
-                    encoded(image, buffers, views, folder).and_then(|bytes| decode(&bytes, max_extent_px));
+                    encoded(image, buffers, views, folder).and_then(|bytes| decode(bytes, max_extent_px));
                 Some((index, pixels))
             })
             .collect();
@@ -117,6 +117,7 @@ impl TextureTable {
                 srgb: key.srgb,
                 sampler: key.sampler,
                 placeholder: pixels.placeholder,
+                encoded: pixels.encoded.clone(),
             });
         }
         Ok((textures, warnings))

@@ -80,7 +80,7 @@ fn read_texture(
 ) -> Texture {
     let pixels = uri::beside(file, folder)
         .and_then(|path| read_file(&path, MAX_IMAGE_FILE_BYTES))
-        .and_then(|bytes| decode(&bytes, options.max_image_extent_px))
+        .and_then(|bytes| decode(bytes, options.max_image_extent_px))
         .unwrap_or_else(|reason| {
             let text = format!("{file} cannot be read ({reason}); a checker stands in");
             warn(place.to_owned(), text);
@@ -94,6 +94,7 @@ fn read_texture(
         srgb: true,
         sampler: Sampler::default(),
         placeholder: pixels.placeholder,
+        encoded: pixels.encoded,
     }
 }
 

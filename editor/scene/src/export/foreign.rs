@@ -1,0 +1,191 @@
+//! What the sources said and the program does not know, said again. In: what import kept, by prefab. Out: members of JSON
+//! objects. Where two sources say something for the whole file under one name, the first has it.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::json::{Extensions, Object, Put};
+use crate::document::Document;
+use crate::foreign::{Mapping, Unknown};
+use crate::ids::{MaterialId, MeshId, PrefabId};
+use crate::prefab::Prefab;
+
+/// The sources of a scene and what they brought.
+pub(super) struct Sources<'a> {
+    document: &'a Document,
+    prefabs: Vec<(PrefabId, &'a Prefab)>,
+    /// Which prefab has an extension of the whole file.
+    owners: BTreeMap<&'a str, PrefabId>,
+    meshes: BTreeMap<MeshId, (PrefabId, usize)>,
+    materials: BTreeMap<MaterialId, (PrefabId, usize)>,
+    /// Place of the first variant of each prefab among all.
+    first_variant: BTreeMap<PrefabId, usize>,
+    /// What was left out, in words.
+    pub warnings: Vec<String>,
+}
+
+impl<'a> Sources<'a> {
+    /// `placed`: the prefabs that the scene places, in order.
+    pub fn new(document: &'a Document, placed: &[PrefabId]) -> Self {
+        let find = |&id: &PrefabId| Some((id, document.prefab(id)?));
+        let mut sources = Self {
+            document,
+            prefabs: placed.iter().filter_map(find).collect(),
+            owners: BTreeMap::new(),
+            meshes: BTreeMap::new(),
+            materials: BTreeMap::new(),
+            first_variant: BTreeMap::new(),
+            warnings: Vec::new(),
+        };
+        let mut variants = 0;
+        for &(id, prefab) in &sources.prefabs {
+            let foreign = &prefab.foreign;
+            for name in foreign.file.extensions.keys() {
+                let owner = *sources.owners.entry(name).or_insert(id);
+                if owner != id {
+                    let reason = format!("{}: {name} is left out, another source has it too", prefab.name);
+                    sources.warnings.push(reason);
+                }
+            }
+            let place = |(place, mesh): (usize, &MeshId)| (*mesh, (id, place));
+            sources.meshes.extend(prefab.meshes.iter().enumerate().map(place));
+            let place = |(place, material): (usize, &MaterialId)| (*material, (id, place));
+            sources.materials.extend(prefab.materials.iter().enumerate().map(place));
+            sources.first_variant.insert(id, variants);
+            variants += foreign.variants.len();
+        }
+        sources
+    }
+
+    /// The materials that came with the sources.
+    pub fn materials(&self) -> impl Iterator<Item = MaterialId> + '_ {
+        self.materials.keys().copied()
+    }
+
+    /// What its source says about a part, and which source.
+    pub fn part(&self, prefab: PrefabId, part: u32) -> Option<(PrefabId, &'a Unknown)> {
+        Some((prefab, self.prefab(prefab)?.foreign.parts.get(&part)?))
+    }
+
+    /// The same of a mesh.
+    pub fn mesh(&self, mesh: MeshId) -> Option<(PrefabId, &'a Unknown)> {
+        let &(prefab, place) = self.meshes.get(&mesh)?;
+        Some((prefab, self.prefab(prefab)?.foreign.meshes.get(&place)?))
+    }
+
+    /// The same of a material.
+    pub fn material(&self, material: MaterialId) -> Option<(PrefabId, &'a Unknown)> {
+        let &(prefab, place) = self.materials.get(&material)?;
+        Some((prefab, self.prefab(prefab)?.foreign.materials.get(&place)?))
+    }
+
+    fn prefab(&self, id: PrefabId) -> Option<&'a Prefab> {
+        self.document.prefab(id)
+    }
+
+    /// Puts what is unknown into an object, with what of its `extras` is ours.
+    pub fn put(
+        &self,
+        object: &mut Object,
+        unknown: Option<(PrefabId, &Unknown)>,
+        own_extras: Object,
+        used: &mut Extensions,
+    ) {
+        let Some((prefab, unknown)) = unknown else {
+            return object.put_filled("extras", own_extras);
+        };
+        for (name, value) in &unknown.extensions {
+            if self.owners.get(name.as_str()).is_none_or(|owner| *owner == prefab) {
+                used.put(object, name, value.clone());
+            }
+        }
+        let extras = match unknown.extras.clone() {
+            Some(Value::Object(mut members)) => {
+                members.extend(own_extras);
+                Some(Value::Object(members))
+            }
+            Some(other) if own_extras.is_empty() => Some(other),
+            _ => Some(Value::Object(own_extras)).filter(|own| own.as_object().is_some_and(|o| !o.is_empty())),
+        };
+        if let Some(extras) = extras {
+            object.put("extras", extras);
+        }
+    }
+
+    /// What the sources say about the file as a whole.
+    pub fn put_file(&self, file: &mut Object, used: &mut Extensions) {
+        self.put_each(file, |prefab| &prefab.foreign.file, Object::new(), used);
+        let variants = self.prefabs.iter().flat_map(|(_, prefab)| prefab.foreign.variants.clone());
+        let variants: Vec<Value> = variants.collect();
+        if !variants.is_empty() {
+            let mut value = Object::new();
+            value.put("variants", variants);
+            used.put(file, "KHR_materials_variants", value);
+        }
+    }
+
+    /// What they say about the asset, and who made it.
+    pub fn put_asset(&self, asset: &mut Object, used: &mut Extensions) {
+        let mut makers: Vec<&str> = Vec::new();
+        for maker in self.prefabs.iter().filter_map(|(_, prefab)| prefab.foreign.copyright.as_deref()) {
+            if !makers.contains(&maker) {
+                makers.push(maker);
+            }
+        }
+        asset.put_text("copyright", &makers.join("; "));
+        self.put_each(asset, |prefab| &prefab.foreign.asset, Object::new(), used);
+    }
+
+    /// What they say about the scene.
+    pub fn put_scene(&self, scene: &mut Object, own_extras: Object, used: &mut Extensions) {
+        self.put_each(scene, |prefab| &prefab.foreign.scene, own_extras, used);
+    }
+
+    /// The extensions of each source, and the `extras` of the first that has some.
+    fn put_each(
+        &self,
+        object: &mut Object,
+        find: impl Fn(&'a Prefab) -> &'a Unknown,
+        own_extras: Object,
+        used: &mut Extensions,
+    ) {
+        let mut extras = None;
+        for &(id, prefab) in self.prefabs.iter().rev() {
+            let unknown = find(prefab);
+            extras = unknown.extras.clone().or(extras);
+            let bare = Unknown { extras: None, extensions: unknown.extensions.clone() };
+            self.put(object, Some((id, &bare)), Object::new(), used);
+        }
+        if let Some((id, _)) = self.prefabs.first() {
+            self.put(object, Some((*id, &Unknown { extras, ..Unknown::default() })), own_extras, used);
+        } else {
+            object.put_filled("extras", own_extras);
+        }
+    }
+
+    /// Gives the primitives of a mesh the materials that variants choose. `places`: those of the materials in the file.
+    pub fn put_variants(
+        &self,
+        mesh: MeshId,
+        primitives: &mut [(u32, &mut Object)],
+        places: &BTreeMap<MaterialId, usize>,
+        used: &mut Extensions,
+    ) {
+        let Some(&(id, mesh)) = self.meshes.get(&mesh) else { return };
+        let (Some(prefab), Some(first)) = (self.prefab(id), self.first_variant.get(&id)) else { return };
+        for (number, object) in primitives {
+            let Some(mappings) = prefab.foreign.mappings.get(&(mesh, *number as usize)) else { continue };
+            let mapping = |mapping: &Mapping| {
+                let material = places.get(prefab.materials.get(mapping.material)?)?;
+                let mut object = Object::new();
+                object.put("material", *material);
+                object.put("variants", mapping.variants.iter().map(|v| v + first).collect::<Vec<_>>());
+                Some(Value::Object(object))
+            };
+            let mut value = Object::new();
+            value.put("mappings", mappings.iter().filter_map(mapping).collect::<Vec<_>>());
+            used.put(object, "KHR_materials_variants", value);
+        }
+    }
+}

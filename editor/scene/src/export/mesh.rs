@@ -1,0 +1,246 @@
+//! Meshes: vertices cut into the sets that primitives share, and primitives with indices and materials.
+//! In: meshes of the document and what is to be written of them. Out: their JSON, and bytes in the buffer. Attributes that
+//! say what is read without them are left out.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use glam::{Vec2, Vec4};
+use serde_json::Value;
+
+use super::buffer::{Buffer, Use};
+use super::foreign::Sources;
+use super::json::{Extensions, Object, Put, numbers};
+use super::shapes;
+use crate::assets::{Material, Mesh, MeshData, MorphTarget};
+use crate::document::Document;
+use crate::ids::{MaterialId, MeshId};
+use crate::import::tangents;
+
+/// One mesh of the file: primitives of a mesh of the document with a choice of materials.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct MeshKey {
+    pub mesh: MeshId,
+    /// Which primitives, growing, at least one.
+    pub primitives: Vec<u32>,
+    /// One a primitive of the whole mesh.
+    pub materials: Vec<MaterialId>,
+}
+
+/// The meshes of the document as triangles.
+pub(super) struct Meshes<'a> {
+    document: &'a Document,
+    made: BTreeMap<MeshId, Option<Mesh>>,
+}
+
+impl<'a> Meshes<'a> {
+    pub fn new(document: &'a Document) -> Self {
+        let of_shapes = document.meshes().filter(|(_, mesh)| mesh.shapes().is_some());
+        Self { document, made: of_shapes.map(|(id, mesh)| (id, shapes::tessellated(mesh))).collect() }
+    }
+
+    /// A mesh; `None` where it has too many spheres and boxes, or is not there.
+    pub fn get(&self, id: MeshId) -> Option<&Mesh> {
+        match self.made.get(&id) {
+            Some(made) => made.as_ref(),
+            None => self.document.mesh(id),
+        }
+    }
+}
+
+/// A run of vertices that some primitives share, and nobody else uses.
+struct VertexSet {
+    vertices: Range<usize>,
+    primitives: Vec<u32>,
+}
+
+/// The vertices of a mesh cut where no triangle crosses; unused ones go with those before them.
+fn vertex_sets(mesh: &Mesh) -> Vec<VertexSet> {
+    let mut spans: Vec<(Range<usize>, u32)> = (0..)
+        .zip(&mesh.primitives)
+        .map(|(number, primitive)| {
+            let indices = mesh.indices_of(primitive);
+            let first = indices.iter().min().map_or(0, |&index| index as usize);
+            (first..indices.iter().max().map_or(first, |&index| index as usize + 1), number)
+        })
+        .collect();
+    spans.sort_by_key(|(span, number)| (span.start, *number));
+    let mut sets: Vec<VertexSet> = Vec::new();
+    for (span, number) in spans {
+        match sets.last_mut() {
+            Some(last) if span.start < last.vertices.end => {
+                last.vertices.end = last.vertices.end.max(span.end);
+                last.primitives.push(number);
+            }
+            _ => sets.push(VertexSet { vertices: span, primitives: vec![number] }),
+        }
+    }
+    let mut end = mesh.data.positions.len();
+    for set in sets.iter_mut().rev() {
+        set.vertices.end = end;
+        end = set.vertices.start;
+    }
+    if let Some(first) = sets.first_mut() {
+        first.vertices.start = 0;
+    }
+    sets
+}
+
+/// Writes meshes.
+pub(super) struct MeshWriter<'a> {
+    pub document: &'a Document,
+    pub buffer: &'a mut Buffer,
+    /// Places of the materials in the file.
+    pub materials: &'a BTreeMap<MaterialId, usize>,
+    pub sources: &'a Sources<'a>,
+    pub used: &'a mut Extensions,
+}
+
+impl MeshWriter<'_> {
+    /// A mesh, and what of its `extras` is ours.
+    pub fn write(&mut self, key: &MeshKey, mesh: &Mesh) -> (Object, Object) {
+        let sets = vertex_sets(mesh);
+        let used = sets.iter().filter(|set| set.primitives.iter().any(|p| key.primitives.contains(p)));
+        let mut primitives: BTreeMap<u32, Object> = BTreeMap::new();
+        for (number, set) in used.enumerate() {
+            let usage = Use::Vertices { set: number };
+            let surfaces: Vec<&Material> = set
+                .primitives
+                .iter()
+                .filter(|p| key.primitives.contains(p))
+                .filter_map(|&p| self.document.material(*key.materials.get(p as usize)?))
+                .collect();
+            let attributes = self.attributes(&mesh.data, &set.vertices, &surfaces, usage);
+            let targets: Vec<Value> = mesh
+                .data
+                .morph
+                .iter()
+                .map(|target| Value::Object(self.target(target, &set.vertices, usage)))
+                .collect();
+            for &p in set.primitives.iter().filter(|p| key.primitives.contains(p)) {
+                let Some(primitive) = mesh.primitives.get(p as usize) else { continue };
+                let first = set.vertices.start as u32;
+                let indices: Vec<u32> =
+                    mesh.indices_of(primitive).iter().map(|index| index - first).collect();
+                let mut object = Object::new();
+                object.put("attributes", attributes.clone());
+                object.put("indices", self.buffer.indices(&indices));
+                let material = key.materials.get(p as usize);
+                if let Some(&place) = material.and_then(|material| self.materials.get(material)) {
+                    object.put("material", place);
+                }
+                object.put_filled("targets", targets.clone());
+                primitives.insert(p, object);
+            }
+        }
+        let mut list: Vec<(u32, &mut Object)> = primitives.iter_mut().map(|(p, o)| (*p, o)).collect();
+        self.sources.put_variants(key.mesh, &mut list, self.materials, self.used);
+        let mut object = Object::new();
+        object.put_text("name", &mesh.name);
+        object.put("primitives", primitives.into_values().map(Value::Object).collect::<Vec<_>>());
+        if mesh.default_weights.iter().any(|weight| *weight != 0.0) {
+            object.put("weights", numbers(&mesh.default_weights));
+        }
+        (object, own_extras(&mesh.data))
+    }
+
+    fn attributes(
+        &mut self,
+        data: &MeshData,
+        vertices: &Range<usize>,
+        surfaces: &[&Material],
+        usage: Use,
+    ) -> Object {
+        let mut attributes = Object::new();
+        let cut = Cut { vertices };
+        let positions: Vec<[f32; 3]> = cut.of(&data.positions).iter().map(|p| p.to_array()).collect();
+        attributes.put("POSITION", self.buffer.floats(&positions, true, usage));
+        let normals: Vec<[f32; 3]> = cut.of(&data.normals).iter().map(|n| n.to_array()).collect();
+        attributes.put("NORMAL", self.buffer.floats(&normals, false, usage));
+        if needs_tangents(data, vertices, surfaces) {
+            let tangents: Vec<[f32; 4]> = cut.of(&data.tangents).iter().map(|t| t.to_array()).collect();
+            attributes.put("TANGENT", self.buffer.floats(&tangents, false, usage));
+        }
+        let second = cut.needed(&data.tex_coords1, Vec2::ZERO);
+        let textured = surfaces.iter().any(|material| material.textures().next().is_some());
+        // A second set without a first is not allowed.
+        let first =
+            textured || second.is_some() || cut.of(&data.tex_coords0).iter().any(|uv| *uv != Vec2::ZERO);
+        let first = first.then(|| cut.of(&data.tex_coords0));
+        for (name, coordinates) in [("TEXCOORD_0", first), ("TEXCOORD_1", second)] {
+            if let Some(coordinates) = coordinates {
+                let values: Vec<[f32; 2]> = coordinates.iter().map(|uv| uv.to_array()).collect();
+                attributes.put(name, self.buffer.floats(&values, false, usage));
+            }
+        }
+        if let Some(colors) = cut.needed(&data.colors, Vec4::ONE) {
+            let values: Vec<[f32; 4]> = colors.iter().map(|color| color.to_array()).collect();
+            attributes.put("COLOR_0", self.buffer.floats(&values, false, usage));
+        }
+        if let Some(skin) = &data.skin
+            && let Some(weights) = cut.needed(&skin.weights, [0.0; 4])
+        {
+            attributes.put("JOINTS_0", self.buffer.joints(cut.of(&skin.joints), usage));
+            attributes.put("WEIGHTS_0", self.buffer.floats(weights, false, usage));
+        }
+        attributes
+    }
+
+    /// What a morph target adds; positions are always there, as a target must not be empty.
+    fn target(&mut self, target: &MorphTarget, vertices: &Range<usize>, usage: Use) -> Object {
+        let mut attributes = Object::new();
+        let nothing = target.normals.is_empty() && target.tangents.is_empty();
+        for (name, deltas) in
+            [("POSITION", &target.positions), ("NORMAL", &target.normals), ("TANGENT", &target.tangents)]
+        {
+            let with_bounds = name == "POSITION";
+            if deltas.is_empty() && !(with_bounds && nothing) {
+                continue;
+            }
+            let values: Vec<[f32; 3]> = Cut { vertices }.of(deltas).iter().map(|d| d.to_array()).collect();
+            let place = match values.iter().any(|value| *value != [0.0; 3]) {
+                true => self.buffer.floats(&values, with_bounds, usage),
+                false => self.buffer.zeros::<3>(vertices.len(), with_bounds),
+            };
+            attributes.put(name, place);
+        }
+        attributes
+    }
+}
+
+/// A run of vertices.
+struct Cut<'a> {
+    vertices: &'a Range<usize>,
+}
+
+impl Cut<'_> {
+    fn of<'d, T>(&self, values: &'d [T]) -> &'d [T] {
+        values.get(self.vertices.clone()).unwrap_or(&[])
+    }
+
+    /// The values here, where they differ from what is read without them; and where nobody's do, so that they are there.
+    fn needed<'d, T: PartialEq>(&self, values: &'d [T], absent: T) -> Option<&'d [T]> {
+        let here = self.of(values);
+        let says = |values: &[T]| values.iter().any(|value| *value != absent);
+        (!here.is_empty() && (says(here) || !says(values))).then_some(here)
+    }
+}
+
+/// Without tangents, import makes any that complete a frame; or those of a normal map, if there is one.
+fn needs_tangents(data: &MeshData, vertices: &Range<usize>, surfaces: &[&Material]) -> bool {
+    let cut = Cut { vertices };
+    let mut pairs = cut.of(&data.tangents).iter().zip(cut.of(&data.normals));
+    surfaces.iter().any(|material| material.normal_texture.is_some())
+        || data.morph.iter().any(|target| !target.tangents.is_empty())
+        || pairs.any(|(tangent, normal)| *tangent != tangents::any(*normal))
+}
+
+/// Names of the morph targets.
+fn own_extras(data: &MeshData) -> Object {
+    let mut extras = Object::new();
+    if data.morph.iter().any(|target| !target.name.is_empty()) {
+        let names: Vec<Value> = data.morph.iter().map(|target| Value::from(target.name.as_str())).collect();
+        extras.put("targetNames", names);
+    }
+    extras
+}

@@ -1,0 +1,165 @@
+//! The nodes of the file in depth-first order. In: a document. Out: who stands where, and which mesh each places.
+//! Walks deep trees without recursion; knows no JSON.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{DAffine3, DQuat, Quat};
+
+use super::mesh::{MeshKey, Meshes};
+use crate::document::Document;
+use crate::ids::{NodeId, PrefabId, Target};
+use crate::import::gltf::unit_rotation;
+use crate::node::NodeKind;
+use crate::transform::Local;
+
+/// Fine enough that no rounding to single precision falls between two lengths, and far enough for what is rounded.
+const LENGTH_STEP: f64 = 1.0 / (1 << 27) as f64;
+const MOST_STEPS: i32 = 32;
+
+/// What a node of the file stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stands {
+    /// A node or part.
+    For(Target),
+    /// One primitive of its mesh that was moved inside the mesh, for which glTF has no word.
+    ForPrimitive(Target, u32),
+}
+
+/// One node of the file.
+pub(super) struct Entry {
+    pub stands: Stands,
+    pub children: Vec<usize>,
+    pub mesh: Option<MeshKey>,
+    /// Parts that are written as GPU instances of its mesh.
+    pub instances: Vec<Target>,
+}
+
+/// All nodes of the file.
+#[derive(Default)]
+pub(super) struct Tree {
+    pub entries: Vec<Entry>,
+    pub roots: Vec<usize>,
+    /// Places of nodes and parts.
+    pub places: BTreeMap<Target, usize>,
+    /// Instances of prefabs in order.
+    pub instances: Vec<(NodeId, PrefabId)>,
+}
+
+impl Tree {
+    pub fn of(document: &Document, meshes: &Meshes<'_>) -> Self {
+        let mut tree = Self::default();
+        let tops: Vec<Target> = match whole_file(document) {
+            Some((node, prefab)) => {
+                tree.instances.push((node, prefab));
+                document.children_of(node.into())
+            }
+            None => document.roots().iter().copied().map(Target::node).collect(),
+        };
+        let mut stack: Vec<(Stands, Option<usize>)> =
+            tops.into_iter().rev().map(|target| (Stands::For(target), None)).collect();
+        while let Some((stands, parent)) = stack.pop() {
+            let place = tree.entries.len();
+            let list =
+                parent.and_then(|parent| tree.entries.get_mut(parent)).map(|entry| &mut entry.children);
+            list.unwrap_or(&mut tree.roots).push(place);
+            let mut entry = Entry { stands, children: Vec::new(), mesh: None, instances: Vec::new() };
+            match stands {
+                Stands::For(target) => {
+                    tree.places.insert(target, place);
+                    if let (None, Some(prefab)) = (target.part, document.prefab_of(target.node)) {
+                        tree.instances.push((target.node, prefab));
+                    }
+                    stack.extend(below(document, meshes, target, &mut entry).map(|s| (s, Some(place))));
+                }
+                Stands::ForPrimitive(target, primitive) => {
+                    entry.mesh = key(document, meshes, target, |p| p == primitive);
+                }
+            }
+            tree.entries.push(entry);
+        }
+        tree
+    }
+
+    /// The prefabs that are placed, in order.
+    pub fn prefabs(&self) -> Vec<PrefabId> {
+        let mut seen = BTreeSet::new();
+        self.instances.iter().map(|(_, prefab)| *prefab).filter(|prefab| seen.insert(*prefab)).collect()
+    }
+}
+
+/// The only root, when it places a file as it is: then its parts are the roots, and a model that is opened and exported
+/// gets no node more.
+fn whole_file(document: &Document) -> Option<(NodeId, PrefabId)> {
+    let [root] = document.roots() else { return None };
+    let node = document.node(*root)?;
+    let plain = node.visible && node.children.is_empty() && node.local == Local::default();
+    let prefab = node.prefab().filter(|id| document.prefab(*id).is_some_and(|p| !p.nodes().is_empty()))?;
+    plain.then_some((*root, prefab))
+}
+
+/// Gives an entry its mesh; returns what hangs below it, the last first.
+fn below(
+    document: &Document,
+    meshes: &Meshes<'_>,
+    target: Target,
+    entry: &mut Entry,
+) -> impl Iterator<Item = Stands> + use<> {
+    let moved = moved_primitives(document, meshes, target);
+    entry.mesh = key(document, meshes, target, |p| !moved.contains(&p));
+    let mut children = document.children_of(target);
+    if let Some(count) = gpu_instances(document, meshes, target) {
+        entry.instances = children.drain(..count).collect();
+        entry.mesh = entry.instances.first().and_then(|first| key(document, meshes, *first, |_| true));
+    }
+    let primitives = moved.into_iter().map(move |primitive| Stands::ForPrimitive(target, primitive));
+    children.into_iter().rev().map(Stands::For).chain(primitives.rev())
+}
+
+/// The mesh of the file for some primitives of the mesh of a target; `None` for none.
+fn key(
+    document: &Document,
+    meshes: &Meshes<'_>,
+    target: Target,
+    wanted: impl Fn(u32) -> bool,
+) -> Option<MeshKey> {
+    let id = document.mesh_of(target)?;
+    let mesh = meshes.get(id)?;
+    let with_triangles = (0..).zip(&mesh.primitives).filter(|(_, primitive)| primitive.index_count > 0);
+    let primitives: Vec<u32> = with_triangles.map(|(number, _)| number).filter(|p| wanted(*p)).collect();
+    let materials = document.materials_of(target, mesh);
+    (!primitives.is_empty()).then_some(MeshKey { mesh: id, primitives, materials })
+}
+
+/// Primitives that get nodes of their own. None of a mesh that a skin bends: the node of such a mesh places nothing.
+fn moved_primitives(document: &Document, meshes: &Meshes<'_>, target: Target) -> Vec<u32> {
+    let mesh = document.mesh_of(target).and_then(|id| meshes.get(id));
+    let Some(mesh) = mesh.filter(|_| document.part(target).is_none_or(|part| part.skin.is_none())) else {
+        return Vec::new();
+    };
+    let moved = (0..).zip(&mesh.primitives).filter(|(_, p)| p.mesh_from_primitive != DAffine3::IDENTITY);
+    moved.map(|(number, _)| number).collect()
+}
+
+/// How many of the first children are still the GPU instances that they were in the file, and can be written as such
+/// without loss: their rotations are single-precision numbers there, made unit ones when they are read.
+fn gpu_instances(document: &Document, meshes: &Meshes<'_>, target: Target) -> Option<usize> {
+    let NodeKind::Prefab { prefab, .. } = document.node(target.node)?.kind else { return None };
+    let part = target.part?;
+    let prefab = document.prefab(prefab)?;
+    let count = *prefab.foreign.instanced.get(&part).filter(|count| **count > 0)?;
+    let as_read = (1..=count).all(|offset| {
+        let target = Target::part(target.node, part + offset);
+        document.part_override(target).is_none()
+            && moved_primitives(document, meshes, target).is_empty()
+            && matches!(document.local(target), Some(Local::Trs(trs)) if single_precision(trs.rotation).is_some())
+    });
+    as_read.then_some(count as usize)
+}
+
+/// The rotation in single precision that is read back as this one, to the bit. A file's rotation is a unit one but for
+/// rounding, so that it is this one at a length close to 1.
+pub(super) fn single_precision(rotation: DQuat) -> Option<Quat> {
+    let lengths = (-MOST_STEPS..=MOST_STEPS).map(|step| 1.0 + f64::from(step) * LENGTH_STEP);
+    let candidates = lengths.map(|length| (rotation * length).as_quat());
+    candidates.into_iter().find(|candidate| unit_rotation(candidate.as_dquat()) == Some(rotation))
+}

@@ -39,6 +39,11 @@ const BsdfValue BSDF_NOTHING = BsdfValue(vec3(0.0), 0.0);
 // Share of its largest value by which a coat that looks black head-on is drawn all the same: it may not be black elsewhere.
 const float LEAST_COAT = 0.05;
 
+// Share that a rough interface passes, to be drawn by: beyond the angle of total reflection some of its microfacets still let light through.
+float expected_passage(Bsdf bsdf, CoatShares shares) {
+    return bsdf.sharp_transmission ? shares.base : max(shares.base, clamp(2.0 * bsdf.brdf.alpha, 0.05, 0.5));
+}
+
 // Interface between the layers and the base: isotropic unless the material says otherwise.
 float interface_pdf(Bsdf bsdf, vec3 v, vec3 h) {
     return bsdf.anisotropic ? anisotropic_pdf_reflected(v, h, bsdf.alpha) : ggx_pdf_reflected(v, h, bsdf.brdf.alpha);
@@ -65,7 +70,7 @@ void bsdf_set_chances(inout Bsdf bsdf, float v_z) {
     CoatShares shares = coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, v_z);
     float below = layers_base_share(bsdf.layers, v_z, v_z);
     float reflect = below * max(max_component(shares.reflected), LEAST_COAT * max_component(bsdf.brdf.f90));
-    float transmit = below * max_component(bsdf.transmitted) * shares.base;
+    float transmit = below * max_component(bsdf.transmitted) * expected_passage(bsdf, shares);
     float diffuse = below * max_component(bsdf.diffuse) * shares.base + layers_sheen_share(bsdf.layers, v_z);
     float beyond = below * max_component(bsdf.beyond) * shares.base;
     float coat = bsdf.layers.coat_weight;

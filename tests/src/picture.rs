@@ -52,6 +52,33 @@ pub fn difference(a: &RgbImage, b: &RgbImage, steps: u8) -> (f64, u8) {
     (outliers as f64 / (a.width() * a.height()).max(1) as f64, largest)
 }
 
+/// A picture to be compared to the bit.
+pub fn bits(image: &Accumulated) -> Vec<[u32; 3]> {
+    image.mean.iter().map(|pixel| pixel.map(f32::to_bits)).collect()
+}
+
+/// Pixels of which a channel differs by more than a share of its value.
+pub fn differing(a: &Accumulated, b: &Accumulated, share: f32) -> usize {
+    let far = |p: &[f32; 3], q: &[f32; 3]| {
+        p.iter().zip(q).any(|(x, y)| (x - y).abs() > share * (x.abs() + y.abs() + 0.01))
+    };
+    a.mean.iter().zip(&b.mean).filter(|(p, q)| far(p, q)).count()
+}
+
+/// Mean of all channels of all pixels.
+pub fn mean_of(image: &Accumulated) -> f32 {
+    image.mean.iter().flatten().sum::<f32>() / (3.0 * image.mean.len() as f32)
+}
+
+/// Mean of (x - r)^2 / (r^2 + 0.01) over all channels (ARCHITECTURE, decision 7).
+pub fn rel_mse(image: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
+    let terms = image.iter().flatten().zip(reference.iter().flatten()).map(|(x, r)| {
+        let (x, r) = (f64::from(*x), f64::from(*r));
+        (x - r) * (x - r) / (r * r + 0.01)
+    });
+    terms.sum::<f64>() / (image.len() * 3) as f64
+}
+
 /// The largest difference of a channel.
 pub fn largest_difference(a: &Accumulated, b: &Accumulated) -> f32 {
     a.mean.iter().flatten().zip(b.mean.iter().flatten()).map(|(x, y)| (x - y).abs()).fold(0.0, f32::max)

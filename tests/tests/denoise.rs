@@ -4,6 +4,7 @@
 
 use caustica_renderer::delta::{Camera, InstanceId, Light, Material, SceneDelta};
 use caustica_renderer::{Pipeline, ReflectionRate, ShadowRate, ViewSettings};
+use caustica_tests::picture::rel_mse;
 use caustica_tests::scene::{Scene, camera_at, lambert, mirror, quad, zoo};
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec3};
@@ -17,15 +18,6 @@ fn settings(pipeline: Pipeline) -> ViewSettings {
 
 fn still(pipeline: Pipeline) -> ViewSettings {
     ViewSettings { temporal: false, ..settings(pipeline) }
-}
-
-/// mean((x - r)^2 / (r^2 + 0.01)) over all channels.
-fn rel_mse(image: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
-    let terms = image.iter().flatten().zip(reference.iter().flatten()).map(|(x, r)| {
-        let (x, r) = (f64::from(*x), f64::from(*r));
-        (x - r) * (x - r) / (r * r + 0.01)
-    });
-    terms.sum::<f64>() / (image.len() * 3) as f64
 }
 
 fn mean_of(image: &[[f32; 3]]) -> f64 {

@@ -5,8 +5,9 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use caustica_renderer::delta::{Camera, Material, TextureUse};
 use caustica_renderer::{Accumulated, Pipeline, ViewSettings};
+use caustica_tests::picture::differing;
 use caustica_tests::scene::{Scene, camera_at, checker, mirror, plain_use, quad, unlit};
-use caustica_tests::shapes::{at, differing};
+use caustica_tests::shapes::at;
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec2, Vec3};
 

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use caustica_renderer::delta::{Geometry, Instance, InstanceId, SceneDelta, Visibility};
 use caustica_renderer::{Accumulated, NeedsMode, Pipeline, ViewSettings};
 use caustica_tests::numbers::Random;
+use caustica_tests::picture::{bits, differing};
 use caustica_tests::scene::{
     Scene, camera_at, camera_parallel, cube, glass, lambert, point_light, quad, sphere, zoo,
 };
@@ -22,18 +23,6 @@ fn settings(pipeline: Pipeline) -> ViewSettings {
 fn zoo_image(settings: ViewSettings, samples: u64) -> Accumulated {
     let (scene, camera) = zoo();
     Studio::of(EXTENT, settings, &scene.delta, camera).mean(samples)
-}
-
-fn bits(image: &Accumulated) -> Vec<[u32; 3]> {
-    image.mean.iter().map(|pixel| pixel.map(f32::to_bits)).collect()
-}
-
-/// Pixels of which a channel differs by more than a share of its value.
-fn differing(a: &Accumulated, b: &Accumulated, share: f32) -> usize {
-    let far = |p: &[f32; 3], q: &[f32; 3]| {
-        p.iter().zip(q).any(|(x, y)| (x - y).abs() > share * (x.abs() + y.abs() + 0.01))
-    };
-    a.mean.iter().zip(&b.mean).filter(|(p, q)| far(p, q)).count()
 }
 
 #[test]

@@ -4,6 +4,7 @@
 
 use caustica_renderer::delta::{Camera, Light, Material, SceneDelta};
 use caustica_renderer::{Pipeline, Sampler, ViewSettings};
+use caustica_tests::picture::rel_mse;
 use caustica_tests::scene::{Scene, camera_at, lambert, quad, sphere};
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec3};
@@ -42,18 +43,6 @@ fn mean(studio: &mut Studio, sampler: Sampler, seed: u32, samples: u64) -> Vec<[
     studio.mean(samples).mean
 }
 
-/// mean((x - r)^2 / (r^2 + 0.01)), ARCHITECTURE, decision 7.
-fn relative_mse(image: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
-    let terms = image.iter().flatten().zip(reference.iter().flatten());
-    let sum: f64 = terms
-        .map(|(x, r)| {
-            let (x, r) = (f64::from(*x), f64::from(*r));
-            (x - r).powi(2) / (r * r + 0.01)
-        })
-        .sum();
-    sum / (image.len() * 3) as f64
-}
-
 #[test]
 fn every_sampler_leads_to_the_same_picture() {
     let mut studio = studio();
@@ -61,7 +50,7 @@ fn every_sampler_leads_to_the_same_picture() {
     let reference = mean(&mut studio, Sampler::Sobol, REFERENCE_SEED, 128);
     for sampler in Sampler::ALL {
         let image = mean(&mut studio, sampler, 0, 32);
-        let error = relative_mse(&image, &reference).sqrt();
+        let error = rel_mse(&image, &reference).sqrt();
         assert!(error < 0.06, "{sampler:?}: {error}");
         let ratio = brightness(&image) / brightness(&reference);
         // All pixels share their jitter, so independent numbers move the edges of the whole picture.
@@ -103,7 +92,7 @@ fn error_table() {
     println!("|---|{}", "---|".repeat(SAMPLES.len()));
     for sampler in Sampler::ALL {
         let row = SAMPLES.map(|samples| {
-            let of_seed = |seed| relative_mse(&mean(&mut studio, sampler, seed, samples), &reference);
+            let of_seed = |seed| rel_mse(&mean(&mut studio, sampler, seed, samples), &reference);
             let error: f64 = (0..SEEDS).map(of_seed).sum::<f64>() / f64::from(SEEDS);
             format!("{:.2} %", error.sqrt() * 100.0)
         });

@@ -3,11 +3,12 @@
 
 use caustica_renderer::delta::{AlphaMode, Camera, Light, Material, Mesh, SceneDelta, Shape};
 use caustica_renderer::{Accumulated, Pipeline, Show, ViewSettings};
+use caustica_tests::picture::{differing, mean_of};
 use caustica_tests::scene::{
     Scene, camera_at, camera_parallel, checker, cube, glass, lambert, mirror, plain_use, point_light, quad,
     sphere,
 };
-use caustica_tests::shapes::{at, ball, block, differing, mean_of, mesh_of};
+use caustica_tests::shapes::{at, ball, block, mesh_of};
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Mat3, Quat, Vec3};
 

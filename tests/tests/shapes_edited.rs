@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use caustica_renderer::delta::{Camera, InstanceId, Mesh, MeshId, SceneDelta};
 use caustica_renderer::{AccelPolicy, NeedsMode, Pipeline, TlasWork, ViewSettings};
+use caustica_tests::picture::{bits, differing};
 use caustica_tests::scene::{Scene, camera_at, lambert, mirror, point_light, quad};
-use caustica_tests::shapes::{at, ball, bits, block, differing, mesh_of};
+use caustica_tests::shapes::{at, ball, block, mesh_of};
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec3};
 

@@ -21,6 +21,8 @@ struct Bsdf {
     Layers layers;
     vec3 compensation;      // share that light reflected more than once adds to the interface (lib/ggx_albedo.glsl); 0: glTF to the letter
     bool front;
+    bool inside;            // of a volume: nothing lies over the base, which shares the surface with the interface instead
+    float interface_share;  // of the surface: from inside as much as lets light pass, else all
     bool sharp_reflection;  // a mirror, or rays that pass straight or bend as one
     bool sharp_transmission;
     float chance_reflect;   // of bsdf_sample to choose each lobe; the rest is diffuse
@@ -65,14 +67,19 @@ vec3 interface_half(Bsdf bsdf, vec3 v, vec2 xi) {
     return bsdf.anisotropic ? anisotropic_sample_half(v, bsdf.alpha, xi) : ggx_sample_half(v, bsdf.brdf.alpha, xi);
 }
 
+// Share of light that reaches the base.
+float base_share(Bsdf bsdf, CoatShares shares) {
+    return bsdf.inside ? 1.0 : shares.base;
+}
+
 // Chances of the lobes by what they are about to send on.
 void bsdf_set_chances(inout Bsdf bsdf, float v_z) {
     CoatShares shares = coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, v_z);
     float below = layers_base_share(bsdf.layers, v_z, v_z);
-    float reflect = below * max(max_component(shares.reflected), LEAST_COAT * max_component(bsdf.brdf.f90));
+    float reflect = below * bsdf.interface_share * max(max_component(shares.reflected), LEAST_COAT * max_component(bsdf.brdf.f90));
     float transmit = below * max_component(bsdf.transmitted) * expected_passage(bsdf, shares);
-    float diffuse = below * max_component(bsdf.diffuse) * shares.base + layers_sheen_share(bsdf.layers, v_z);
-    float beyond = below * max_component(bsdf.beyond) * shares.base;
+    float diffuse = below * max_component(bsdf.diffuse) * base_share(bsdf, shares) + layers_sheen_share(bsdf.layers, v_z);
+    float beyond = below * max_component(bsdf.beyond) * base_share(bsdf, shares);
     float coat = bsdf.layers.coat_weight;
     float sum = reflect + transmit + diffuse + beyond + coat;
     float scale = sum > 0.0 ? 1.0 / sum : 0.0;
@@ -89,8 +96,9 @@ Bsdf bsdf_begin(Surface surface, Sides sides, mat3 render_from_local, vec3 v) {
     bsdf.anisotropic = has_lobe(surface.lobes, LOBE_ANISOTROPY) && surface.lobes.anisotropy > 0.0;
     bsdf.alpha = anisotropic_alpha(bsdf.brdf.alpha, surface.lobes.anisotropy);
     bsdf.sides = sides;
-    bool from_inside = !sides.thin && !surface.front; // the layers lie outside
-    bsdf.layers = layers_begin(from_inside ? LOBES_NONE : surface.lobes, render_from_local, v);
+    bsdf.inside = !sides.thin && !surface.front;
+    bsdf.interface_share = bsdf.inside ? (1.0 - surface.metallic) * surface.transmission : 1.0;
+    bsdf.layers = layers_begin(bsdf.inside ? LOBES_NONE : surface.lobes, render_from_local, v);
     float through = has_lobe(surface.lobes, LOBE_DIFFUSE_TRANSMISSION) ? surface.lobes.diffuse_transmission : 0.0;
     bsdf.diffuse = surface_diffuse_albedo(surface) * (1.0 - through);
     bsdf.beyond = surface.lobes.diffuse_transmission_color * ((1.0 - surface.metallic) * (1.0 - surface.transmission) * through);
@@ -130,10 +138,11 @@ bool bsdf_spreads(Bsdf bsdf) {
 BsdfValue bsdf_reflected(Bsdf bsdf, vec3 v, vec3 l, vec3 h) {
     CoatShares shares = coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, clamp(dot(v, h), 0.0, 1.0));
     BsdfValue result;
-    result.value = bsdf.diffuse * (shares.base * l.z / PI);
+    result.value = bsdf.diffuse * (base_share(bsdf, shares) * l.z / PI);
     result.pdf = bsdf_chance_diffuse(bsdf) * cosine_pdf(l.z);
     if (!bsdf.sharp_reflection) {
-        result.value += shares.reflected * (1.0 + bsdf.compensation) * interface_value(bsdf, v, l, h);
+        vec3 reflected = bsdf.interface_share * shares.reflected;
+        result.value += reflected * (1.0 + bsdf.compensation) * interface_value(bsdf, v, l, h);
         result.pdf += bsdf.chance_reflect * interface_pdf(bsdf, v, h);
     }
     if (NEEDS_LOBES && bsdf.layers.flags != 0u) {
@@ -165,7 +174,7 @@ BsdfValue bsdf_transmitted(Bsdf bsdf, vec3 v, vec3 l, vec3 h) {
 BsdfValue bsdf_beyond(Bsdf bsdf, vec3 v, vec3 l) {
     vec3 mirrored = vec3(l.xy, -l.z);
     vec3 h = normalize_or(v + mirrored, vec3(0.0, 0.0, 1.0));
-    float share = coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, clamp(dot(v, h), 0.0, 1.0)).base;
+    float share = base_share(bsdf, coat_shares(bsdf.brdf, bsdf.sides, bsdf.front, clamp(dot(v, h), 0.0, 1.0)));
     float weight = share * layers_base_share(bsdf.layers, v.z, mirrored.z);
     return BsdfValue(bsdf.beyond * (weight * mirrored.z / PI), bsdf.chance_beyond * cosine_pdf(mirrored.z));
 }
@@ -215,7 +224,7 @@ Scatter bsdf_sample_sharp(Bsdf bsdf, Surface surface, float v_z, bool transmitte
     float below = layers_base_share(bsdf.layers, v_z, transmitted && !bsdf.sides.thin ? shares.cos_t : v_z);
     if (!transmitted) {
         vec3 direction = reflect_travel(travel, surface.shading_normal, surface.geometric_normal);
-        return Scatter(true, false, direction, shares.reflected * (below / bsdf.chance_reflect), 0.0);
+        return Scatter(true, false, direction, shares.reflected * (bsdf.interface_share * below / bsdf.chance_reflect), 0.0);
     }
     vec3 direction = bsdf.sides.thin ? travel : refract_travel(travel, surface.shading_normal, bsdf.sides.eta, v_z, shares.cos_t);
     vec3 weight = bsdf.transmitted * (below * shares.base / bsdf.chance_transmit);

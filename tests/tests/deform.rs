@@ -361,6 +361,8 @@ fn what_does_not_fit_is_refused_by_name_and_harms_nothing() {
         studio.session.frames.submit(recorder, None).expect("a submission");
         assert!(error.contains("mesh 'bar'") && error.contains(words), "{error}");
     }
+    // Another pose and back: the same once more would be no change.
+    studio.frame(&pose_delta(ids[0], bent(0.2, 1.0)));
     let reason = String::from("again");
     studio.frame(&SceneDelta { reason, ..pose_delta(ids[0], bent(0.5, 1.0)) });
     assert_eq!(studio.mean(2).mean, before.mean);

@@ -12,7 +12,7 @@ mod texture;
 
 pub(crate) use deform::{Bounds, join, moved};
 pub use deform::{DeformPose, MorphTarget, SkinData};
-pub use environment::{Environment, EnvironmentFile, RadianceMap};
+pub use environment::{Environment, EnvironmentFile, MAX_RADIANCE, RadianceMap};
 pub use light::{Camera, Light, LightKind, Projection};
 pub use lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen, SpecularGlossiness};
 pub use material::{AlphaMode, Material, ShadingMode};

@@ -21,9 +21,10 @@ mod transform;
 pub use animation::{Animation, Channel, ChannelPath, ClipChoice, Interpolation, Sample};
 pub use assets::{
     AlphaMode, Anisotropy, Camera, Clearcoat, Cloud, DeformPose, DiffuseTransmission, Distribution,
-    Environment, EnvironmentFile, Iridescence, Light, LightKind, MOST_SHAPES, Material, Mesh, MeshData,
-    MorphTarget, Primitive, Projection, RadianceMap, Sampler, ShadingMode, Shape, ShapeFault, ShapeFile,
-    ShapeKind, ShapeSource, Shapes, Sheen, SkinData, SpecularGlossiness, Texture, TextureUse, Wrap,
+    Environment, EnvironmentFile, Iridescence, Light, LightKind, MAX_RADIANCE, MOST_SHAPES, Material, Mesh,
+    MeshData, MorphTarget, Primitive, Projection, RadianceMap, Sampler, ShadingMode, Shape, ShapeFault,
+    ShapeFile, ShapeKind, ShapeSource, Shapes, Sheen, SkinData, SpecularGlossiness, Texture, TextureUse,
+    Wrap,
 };
 pub use audit::{Finding, Severity, Subject, audit};
 pub use changes::{ChangeSet, Content};

@@ -16,7 +16,7 @@ use serde_json::json;
 
 pub(super) use args::RenderArgs;
 pub(super) use args::parse_size;
-use args::settings_of;
+use args::{settings_of, without_effect};
 
 use super::DeviceArgs;
 use super::output::{self, Kind, Metadata};
@@ -77,6 +77,9 @@ pub(super) fn run(
     }
     let show_light = args.show_light.as_deref().map(|name| light_of(&session, name)).transpose()?;
     let settings = settings_of(args, session.settings().clone());
+    for what in without_effect(args, &settings) {
+        tracing::warn!("without effect: {what}");
+    }
     session.set_settings(ViewSettings { show_light, ..settings });
     session.set_sample_target(sample_limit(args))?;
     if args.sample_offset > 0 {

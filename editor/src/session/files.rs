@@ -8,8 +8,8 @@ use anyhow::{Context, bail};
 use caustica_renderer::ViewSettings;
 use caustica_scene::import::{self, ImportOptions, Imported};
 use caustica_scene::{
-    Document, Edit, Environment, EnvironmentFile, Local, Material, NodeId, Project, ProjectMeta, RadianceMap,
-    ShapeFault, ShapeFile, ShapeSource,
+    Document, Edit, Environment, EnvironmentFile, Local, MAX_RADIANCE, Material, NodeId, Project,
+    ProjectMeta, RadianceMap, ShapeFault, ShapeFile, ShapeSource,
 };
 use glam::Vec4;
 
@@ -174,8 +174,8 @@ pub fn environment_argument(text: &str) -> anyhow::Result<Environment> {
     if let [r, g, b] = numbers[..]
         && text.split(',').count() == 3
     {
-        if [r, g, b].iter().any(|v| !v.is_finite() || *v < 0.0) {
-            bail!("--environment {text}: radiance must be finite and not negative");
+        if [r, g, b].iter().any(|v| !(0.0..=MAX_RADIANCE).contains(v)) {
+            bail!("--environment {text}: radiance must be from 0 to {MAX_RADIANCE:e}");
         }
         return Ok(Environment::Constant(glam::Vec3::new(r, g, b)));
     }

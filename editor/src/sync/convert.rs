@@ -142,7 +142,9 @@ impl Maps {
     /// What surrounds the scene. A file that could not be read is black.
     pub fn environment_of(&mut self, environment: &scene::Environment) -> delta::Environment {
         match environment {
-            scene::Environment::Constant(radiance) => delta::Environment::Constant(*radiance),
+            scene::Environment::Constant(radiance) => {
+                delta::Environment::Constant(radiance.min(Vec3::splat(scene::MAX_RADIANCE)))
+            }
             scene::Environment::Auto | scene::Environment::DefaultSky => {
                 delta::Environment::Equirectangular {
                     map: Arc::clone(self.sky.get_or_insert_with(|| Arc::new(default_sky()))),

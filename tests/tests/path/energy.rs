@@ -73,6 +73,20 @@ fn rough_coats_and_rough_glass_make_no_light() {
     }
 }
 
+/// Where half of a surface is glass around a volume, the other half shines from inside as a white wall does.
+#[test]
+fn what_is_half_glass_makes_no_light() {
+    let mut furnace = Furnace::new();
+    for roughness in [0.0, 0.1, 0.3] {
+        let half =
+            Material { metallic: 0.0, roughness, transmission: 0.5, has_volume: true, ..Material::default() };
+        let (mean, error) = furnace.with(&format!("half glass, roughness {roughness}"), half, 32);
+        // glTF lets the base have a little more than the coat leaves.
+        assert!(mean < 1.01 + 4.0 * error, "roughness {roughness}: {mean} +- {error}");
+        assert!(error < 0.01 && mean > 0.95, "roughness {roughness}: {mean} +- {error}");
+    }
+}
+
 #[test]
 fn rough_metal_loses_nothing_when_repeated_scattering_counts() {
     let mut furnace = Furnace::new();

@@ -6,6 +6,9 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+/// What shines is cut at this radiance, far above every real light, so that a sum of samples stays finite.
+pub const MAX_RADIANCE: f32 = 1e15;
+
 /// What surrounds the scene, as the document says it.
 #[derive(Clone, Debug, Default)]
 pub enum Environment {

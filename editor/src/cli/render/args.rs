@@ -163,6 +163,25 @@ enum SamplerArg {
     BlueNoise,
 }
 
+/// Options that were given and change nothing, with the reason.
+pub(super) fn without_effect(args: &RenderArgs, settings: &ViewSettings) -> Vec<&'static str> {
+    let (raster, path) = (settings.pipeline == Pipeline::Raster, settings.pipeline == Pipeline::Path);
+    let half = matches!(args.reflection_rate, Some(RateArg::Half));
+    let penumbra = matches!(args.shadow_rate, Some(ShadowRateArg::Penumbra));
+    let primary = matches!(args.primary, Some(PrimaryArg::Raster | PrimaryArg::Rays));
+    let list = [
+        (args.denoises() && raster, "--denoise: `raster` casts no rays, there is nothing to denoise"),
+        (half && !args.denoises(), "--reflection-rate half: only while light is denoised (--denoise)"),
+        (half && (raster || path), "--reflection-rate half: of `hybrid` and `raytraced` alone"),
+        (penumbra && !args.denoises(), "--shadow-rate penumbra: only while light is denoised (--denoise)"),
+        (penumbra && (raster || path), "--shadow-rate penumbra: of `hybrid` and `raytraced` alone"),
+        (primary && settings.pipeline != Pipeline::Hybrid, "--primary: of `hybrid` alone"),
+        (args.multiple_scattering && !path, "--multiple-scattering: of `path` alone"),
+        (args.shadow_rays.is_some() && (raster || path), "--shadow-rays: of `hybrid` and `raytraced` alone"),
+    ];
+    list.into_iter().filter(|(given, _)| *given).map(|(_, what)| what).collect()
+}
+
 pub(in crate::cli) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
     let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));

@@ -16,8 +16,6 @@ mod lobes;
 const GLASS_TRANSMISSION: f32 = 0.5;
 /// Roughness up to which glass counts as smooth.
 const SMOOTH_ROUGHNESS: f32 = 0.05;
-/// Emissive strength is cut here, far above every real light, so that a sum of samples stays finite.
-const MAX_EMISSIVE_STRENGTH: f32 = 1e15;
 /// Stands for an infinite index of refraction: all light is reflected.
 pub(crate) const INFINITE_IOR: f32 = 1e6;
 
@@ -79,7 +77,7 @@ impl Reader<'_> {
     fn extensions(&mut self, item: &Item<'_>, material: &mut Material) -> Result<(), Fault> {
         if let Some(extension) = item.extension("KHR_materials_emissive_strength")? {
             material.emissive_strength =
-                self.within(&extension, "emissiveStrength", 1.0, 0.0..=MAX_EMISSIVE_STRENGTH)?;
+                self.within(&extension, "emissiveStrength", 1.0, 0.0..=crate::assets::MAX_RADIANCE)?;
         }
         if let Some(extension) = item.extension("KHR_materials_ior")? {
             material.ior = match extension.f32_or("ior", 1.5)? {

@@ -29,15 +29,15 @@ struct KnownShadows {
     uint rays;      // traced to lights that are known of
 };
 
-// One of the 8 frames of each block, another in the next.
+// One of the 8 frames of each block, another in the next. Tiles of 8 x 8 pixels have it together: invocations that run side by side trace together.
 bool has_turn(Frame frame, uvec2 pixel) {
     uint index = uint(frame.sample_index);
-    uint place = (pixel.x & 3u) | (pixel.y & 1u) << 2u;
+    uint place = (pixel.x >> 3u & 3u) | (pixel.y >> 3u & 1u) << 2u;
     return ((index ^ place ^ hash_combine(frame.seed, index >> 3u)) & 7u) == 0u;
 }
 
 // The pixel where the surface was in the last frame; outside of the image where it was not seen. Nothing but the camera has moved.
-ivec2 previous_pixel(Frame frame, uvec2 pixel, uvec4 id) {
+ivec2 previous_pixel(Frame frame, uvec2 pixel, Surface surface) {
     const ivec2 nowhere = ivec2(-1);
     // Rounded up and down in turns (R2 sequence), so that over the frames what is kept moves as far as the surface does.
     vec2 rounding = fract(float(uint(frame.sample_index) & 1023u) * vec2(0.7548776662, 0.5698402910));
@@ -45,25 +45,20 @@ ivec2 previous_pixel(Frame frame, uvec2 pixel, uvec4 id) {
     if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, ivec2(frame.extent_px)))) {
         return nowhere;
     }
-    CameraRay ray = camera_ray(frame, camera_sample_position(frame, pixel));
-    Scene scene = SceneTable(frame.scene).scene;
-    vec3 position = element_point(element_on_line(scene, id.x - 1u, id.y, id.z, ray.origin, ray.direction)).position;
-    uvec2 normals = texelFetch(gbuffer_normal, ivec2(pixel), 0).xy;
-    vec4 clip = frame.previous_clip_from_render * vec4(position, 1.0);
+    vec4 clip = frame.previous_clip_from_render * vec4(surface.position, 1.0);
     float depth = clip.z / clip.w;
-    float tolerance = depth_tolerance(frame, ivec2(frame.extent_px), depth, abs(dot(octahedral_decode(normals.y), ray.direction)));
+    float tolerance = depth_tolerance(frame, ivec2(frame.extent_px), depth, abs(dot(surface.geometric_normal, surface.view)));
     bool same = clip.w > 0.0 && abs(texelFetch(previous_depth, p, 0).x - depth) <= tolerance
-        && dot(octahedral_decode(texelFetch(previous_normal, p, 0).x), octahedral_decode(normals.x)) > SAME_NORMAL;
+        && dot(octahedral_decode(texelFetch(previous_normal, p, 0).x), octahedral_decode(texelFetch(gbuffer_normal, ivec2(pixel), 0).x)) > SAME_NORMAL;
     return same ? p : nowhere;
 }
 
-KnownShadows known_shadows(Frame frame, uvec2 pixel) {
+KnownShadows known_shadows(Frame frame, uvec2 pixel, Surface surface) {
     KnownShadows known = KnownShadows(0u, 0u, 0u);
-    uvec4 id = texelFetch(gbuffer_id, ivec2(pixel), 0);
-    if ((frame.flags & FRAME_SHADOWS_KNOWN) == 0u || id.x == 0u || has_turn(frame, pixel)) {
+    if ((frame.flags & FRAME_SHADOWS_KNOWN) == 0u || has_turn(frame, pixel)) {
         return known;
     }
-    ivec2 p = previous_pixel(frame, pixel, id);
+    ivec2 p = previous_pixel(frame, pixel, surface);
     if (p.x < 0) {
         return known;
     }

@@ -15,6 +15,11 @@ layout(set = 1, binding = 3) uniform texture2D gbuffer_material;
 layout(set = 1, binding = 4, rgba32f) uniform writeonly image2D direct_diffuse;
 layout(set = 1, binding = 5, rgba32f) uniform writeonly image2D direct_specular;
 
+#ifdef SHADOWS_ARE_REMEMBERED
+// Before light is drawn for it.
+void surface_found(Frame frame, uvec2 pixel, Surface surface);
+#endif
+
 void light_pixel(uvec2 pixel) {
     Frame frame = FrameTable(push.frame_address).frame;
     Scene scene = SceneTable(frame.scene).scene;
@@ -25,6 +30,9 @@ void light_pixel(uvec2 pixel) {
     if (id.x != 0u) {
         Surface surface = surface_from_gbuffer(frame, scene, pixel, id, texelFetch(gbuffer_normal, at, 0).xy,
             texelFetch(gbuffer_base_color, at, 0), texelFetch(gbuffer_material, at, 0).xy);
+#ifdef SHADOWS_ARE_REMEMBERED
+        surface_found(frame, pixel, surface);
+#endif
         bool lobe_traced = frame.max_depth > 0u && surface_reflects(frame, surface);
         Sequence sequence = sequence_begin(frame.seed, pixel, frame.sample_index);
         Receiver receiver = receiver_begin(surface, lobe_traced, sequence, 0u, 0u);

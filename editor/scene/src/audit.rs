@@ -7,7 +7,7 @@ use std::fmt;
 use glam::DAffine3;
 
 use crate::animation::ClipChoice;
-use crate::assets::{AlphaMode, Material, Mesh, ShapeSource};
+use crate::assets::{AlphaMode, Light, LightKind, Material, Mesh, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
 use crate::import::geometry::has_no_area;
@@ -76,6 +76,7 @@ pub fn audit(document: &Document) -> Vec<Finding> {
     let mut audit = Audit { document, findings: Vec::new() };
     audit.prefabs();
     audit.transforms();
+    audit.lights();
     for (id, mesh) in document.meshes() {
         audit.mesh(id, mesh);
         audit.shapes(id, mesh);
@@ -192,6 +193,17 @@ impl Audit<'_> {
                     world.translation.length()
                 );
                 self.add(Severity::Info, subject, &name, message);
+            }
+        }
+    }
+
+    fn lights(&mut self) {
+        let faulty: Vec<(Target, Vec<&str>)> =
+            self.document.lights().map(|placed| (placed.target, light_faults(&placed.value))).collect();
+        for (target, faults) in faulty {
+            let name = self.document.display_name(target);
+            for fault in faults {
+                self.add(Severity::Warning, Subject::Target(target), &name, fault.to_owned());
             }
         }
     }
@@ -324,6 +336,30 @@ impl Audit<'_> {
     }
 }
 
+/// What no lamp can be, in words.
+fn light_faults(light: &Light) -> Vec<&'static str> {
+    use std::f32::consts::{FRAC_PI_2, PI};
+    let (range_m, cone, sun_rad) = match light.kind {
+        LightKind::Point { range_m, .. } => (range_m, None, 0.0),
+        LightKind::Spot { range_m, inner_rad, outer_rad, .. } => (range_m, Some((inner_rad, outer_rad)), 0.0),
+        LightKind::Directional { angular_radius_rad } => (None, None, angular_radius_rad),
+    };
+    let faults = [
+        (
+            light.color.min_element() < 0.0 || light.intensity < 0.0,
+            "it takes light away: its intensity is below 0",
+        ),
+        (range_m.is_some_and(|range_m| range_m <= 0.0), "its range ends where it stands: it lights nothing"),
+        (cone.is_some_and(|(inner, outer)| inner > outer), "its inner cone is wider than the outer one"),
+        (
+            cone.is_some_and(|(_, outer)| !(0.0..=FRAC_PI_2).contains(&outer)),
+            "its cone is no cone: 0 to 90 degrees from the axis",
+        ),
+        (!(0.0..=PI).contains(&sun_rad), "it is seen under more than the whole sky"),
+    ];
+    faults.into_iter().filter(|(is_so, _)| *is_so).map(|(_, words)| words).collect()
+}
+
 /// What lobes hold that has to be within 0 and 1.
 fn lobe_shares(material: &Material) -> Vec<(&'static str, f32)> {
     let mut shares = Vec::new();
@@ -362,6 +398,7 @@ mod tests {
     use crate::assets::{MeshData, Primitive};
     use crate::edit::Edit;
     use crate::import::Imported;
+    use crate::node::Node;
     use crate::prefab::{PartNode, Prefab};
     use crate::transform::{Local, Trs};
 
@@ -426,6 +463,34 @@ mod tests {
         assert!(messages(&document)[0].contains("clip 2, the source has 0"));
         document.apply(Edit::SetClip { node, clip: ClipChoice::All }).unwrap();
         assert_eq!(messages(&document), [""; 0]);
+    }
+
+    #[test]
+    fn a_lamp_that_cannot_be_is_found() {
+        let mut document = Document::new();
+        let point = LightKind::Point { radius_m: 0.0, range_m: None };
+        let spot =
+            |inner_rad, outer_rad| LightKind::Spot { radius_m: 0.0, range_m: None, inner_rad, outer_rad };
+        let sun = |angular_radius_rad| LightKind::Directional { angular_radius_rad };
+        let ended = LightKind::Point { radius_m: 0.1, range_m: Some(0.0) };
+        for (kind, intensity, faults) in [
+            (point, 1.0, 0),
+            (spot(0.0, 0.7), 1.0, 0),
+            (sun(0.005), 1.0, 0),
+            (point, -5.0, 1),
+            (ended, 1.0, 1),
+            (spot(0.8, 0.4), 1.0, 1),
+            (spot(0.8, 2.0), 1.0, 1),
+            (sun(6.3), 1.0, 1),
+        ] {
+            let light = Light { color: Vec3::ONE, intensity, kind };
+            let (node, edit) = document.add_edit(Node::new("lamp", NodeKind::Light(light)), None);
+            document.apply(edit).unwrap();
+            let found =
+                messages(&document).iter().filter(|message| message.contains("warning: lamp")).count();
+            assert_eq!(found, faults, "{light:?}");
+            document.apply(Edit::RemoveNode { node }).unwrap();
+        }
     }
 
     #[test]

@@ -418,6 +418,29 @@ fn extras_give_lights_a_size_and_the_scene_an_environment() {
 }
 
 #[test]
+fn lamps_that_cannot_be_are_held_to_what_can_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let members = r#""materials":[{}],"scene":0,"scenes":[{"nodes":[0,1,2]}],
+      "nodes":[{"extensions":{"KHR_lights_punctual":{"light":0}}},
+               {"extensions":{"KHR_lights_punctual":{"light":1}}},
+               {"extensions":{"KHR_lights_punctual":{"light":2}}}],
+      "extensions":{"KHR_lights_punctual":{"lights":[
+        {"type":"directional","extras":{"angle":360.0}},
+        {"type":"point","intensity":-5},
+        {"type":"spot","spot":{"innerConeAngle":0.9,"outerConeAngle":0.5}}]}}"#;
+    let imported = load(&triangle_file(folder.path(), members), &ImportOptions::default()).unwrap();
+    let found: Vec<&str> = imported.warnings.iter().map(|warning| warning.message.as_str()).collect();
+    assert_eq!(
+        found,
+        [
+            "a sun of 360 degrees; 180 are taken",
+            "-5 has to be at least 0; 0 is taken",
+            "0.9 has to be within 0 and 0.5; 0.5 is taken",
+        ]
+    );
+}
+
+#[test]
 fn one_image_read_as_colour_and_as_data_is_two_textures() {
     let folder = tempfile::tempdir().unwrap();
     let members = r#""materials":[{"emissiveTexture":{"index":0},"occlusionTexture":{"index":0},

@@ -1,6 +1,8 @@
 //! A place in a JSON document, read with checks: every value is asked for by type and an answer that does
 //! not fit is a [`Fault`] with the JSON pointer of the place. Knows JSON, not glTF.
 
+use std::ops::RangeInclusive;
+
 use serde_json::{Map, Value};
 
 /// What is wrong at which place of the file.
@@ -281,4 +283,24 @@ fn kind(value: &Value) -> &'static str {
         Value::Array(_) => "an array",
         Value::Object(_) => "an object",
     }
+}
+
+/// A number within bounds; one that is not is held to them, with a warning that names the field.
+pub(super) fn held(
+    item: &Item<'_>,
+    key: &str,
+    given: f32,
+    range: &RangeInclusive<f32>,
+    warnings: &mut Vec<Fault>,
+) -> f32 {
+    let held = given.clamp(*range.start(), *range.end());
+    if held != given {
+        let bounds = match *range.end() {
+            f32::MAX => format!("at least {}", range.start()),
+            end => format!("within {} and {end}", range.start()),
+        };
+        let reason = format!("{given} has to be {bounds}; {held} is taken");
+        warnings.push(Fault::new(format!("{}/{key}", item.place()), reason));
+    }
+    held
 }

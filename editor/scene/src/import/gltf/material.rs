@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::json::{Fault, Item};
+use super::json::{Fault, Item, held};
 use super::texture::TextureTable;
 use crate::assets::{AlphaMode, Material, ShadingMode, TextureUse};
 
@@ -144,16 +144,7 @@ impl Reader<'_> {
     }
 
     fn held(&mut self, item: &Item<'_>, key: &str, given: f32, range: &RangeInclusive<f32>) -> f32 {
-        let held = given.clamp(*range.start(), *range.end());
-        if held != given {
-            let bounds = match *range.end() {
-                f32::MAX => format!("at least {}", range.start()),
-                end => format!("within {} and {end}", range.start()),
-            };
-            let reason = format!("{given} has to be {bounds}; {held} is taken");
-            self.warnings.push(Fault::new(format!("{}/{key}", item.place()), reason));
-        }
-        held
+        held(item, key, given, range, &mut self.warnings)
     }
 
     /// A normal map and its scale.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
 
 use super::accessor::Accessors;
-use super::json::{Fault, Item};
+use super::json::{Fault, Item, held};
 use super::mesh::read_weights;
 use crate::assets::{Camera, Environment, Light, LightKind, Mesh, Projection};
 use crate::ids::MeshId;
@@ -122,7 +122,7 @@ impl Reader<'_> {
         let light = match item.extension("KHR_lights_punctual")? {
             Some(extension) => {
                 let index = extension.required_index("light", self.lights.len(), "light")?;
-                self.lights.get(index).map(|light| read_light(light, item)).transpose()?
+                self.lights.get(index).map(|light| read_light(light, item, &mut tree.warnings)).transpose()?
             }
             None => None,
         };
@@ -272,7 +272,7 @@ fn extra(light: &Item<'_>, node: &Item<'_>, key: &str, default: f64) -> Result<f
 }
 
 /// KHR_lights_punctual, with `radius` (metres) or `angle` (full angle in degrees) from `extras`.
-fn read_light(item: &Item<'_>, node: &Item<'_>) -> Result<Light, Fault> {
+fn read_light(item: &Item<'_>, node: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Light, Fault> {
     let range_m = match item.f64("range")? {
         Some(range) if range > 0.0 && (range as f32).is_finite() => Some(range as f32),
         _ => None,
@@ -288,16 +288,22 @@ fn read_light(item: &Item<'_>, node: &Item<'_>) -> Result<Light, Fault> {
                 ),
                 None => (0.0, std::f32::consts::FRAC_PI_4),
             };
-            let outer_rad = outer.clamp(0.0, std::f32::consts::FRAC_PI_2);
+            let outer_rad =
+                held(item, "spot/outerConeAngle", outer, &(0.0..=std::f32::consts::FRAC_PI_2), warnings);
             LightKind::Spot {
                 radius_m: radius()?,
                 range_m,
-                inner_rad: inner.clamp(0.0, outer_rad),
+                inner_rad: held(item, "spot/innerConeAngle", inner, &(0.0..=outer_rad), warnings),
                 outer_rad,
             }
         }
         Some("directional") => {
-            let angle_deg = extra(item, node, "angle", DEFAULT_SUN_ANGLE_DEG)?.min(180.0);
+            let angle_deg = extra(item, node, "angle", DEFAULT_SUN_ANGLE_DEG)?;
+            if angle_deg > 180.0 {
+                let words = format!("a sun of {angle_deg} degrees; 180 are taken");
+                warnings.push(item.fault(words));
+            }
+            let angle_deg = angle_deg.min(180.0);
             LightKind::Directional { angular_radius_rad: (angle_deg.to_radians() / 2.0) as f32 }
         }
         Some(other) => return Err(item.fault(format!("light type {other} does not exist"))),
@@ -305,7 +311,7 @@ fn read_light(item: &Item<'_>, node: &Item<'_>) -> Result<Light, Fault> {
     };
     Ok(Light {
         color: Vec3::from(item.f32s_or("color", [1.0; 3])?).max(Vec3::ZERO),
-        intensity: item.f32_or("intensity", 1.0)?.max(0.0),
+        intensity: held(item, "intensity", item.f32_or("intensity", 1.0)?, &(0.0..=f32::MAX), warnings),
         kind,
     })
 }

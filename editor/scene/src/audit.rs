@@ -7,7 +7,7 @@ use std::fmt;
 use glam::DAffine3;
 
 use crate::animation::ClipChoice;
-use crate::assets::{AlphaMode, Light, LightKind, Material, Mesh, ShapeSource};
+use crate::assets::{AlphaMode, Material, Mesh, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
 use crate::import::geometry::has_no_area;
@@ -199,7 +199,7 @@ impl Audit<'_> {
 
     fn lights(&mut self) {
         let faulty: Vec<(Target, Vec<&str>)> =
-            self.document.lights().map(|placed| (placed.target, light_faults(&placed.value))).collect();
+            self.document.lights().map(|placed| (placed.target, placed.value.faults())).collect();
         for (target, faults) in faulty {
             let name = self.document.display_name(target);
             for fault in faults {
@@ -336,30 +336,6 @@ impl Audit<'_> {
     }
 }
 
-/// What no lamp can be, in words.
-fn light_faults(light: &Light) -> Vec<&'static str> {
-    use std::f32::consts::{FRAC_PI_2, PI};
-    let (range_m, cone, sun_rad) = match light.kind {
-        LightKind::Point { range_m, .. } => (range_m, None, 0.0),
-        LightKind::Spot { range_m, inner_rad, outer_rad, .. } => (range_m, Some((inner_rad, outer_rad)), 0.0),
-        LightKind::Directional { angular_radius_rad } => (None, None, angular_radius_rad),
-    };
-    let faults = [
-        (
-            light.color.min_element() < 0.0 || light.intensity < 0.0,
-            "it takes light away: its intensity is below 0",
-        ),
-        (range_m.is_some_and(|range_m| range_m <= 0.0), "its range ends where it stands: it lights nothing"),
-        (cone.is_some_and(|(inner, outer)| inner > outer), "its inner cone is wider than the outer one"),
-        (
-            cone.is_some_and(|(_, outer)| !(0.0..=FRAC_PI_2).contains(&outer)),
-            "its cone is no cone: 0 to 90 degrees from the axis",
-        ),
-        (!(0.0..=PI).contains(&sun_rad), "it is seen under more than the whole sky"),
-    ];
-    faults.into_iter().filter(|(is_so, _)| *is_so).map(|(_, words)| words).collect()
-}
-
 /// What lobes hold that has to be within 0 and 1.
 fn lobe_shares(material: &Material) -> Vec<(&'static str, f32)> {
     let mut shares = Vec::new();
@@ -395,7 +371,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::assets::{MeshData, Primitive};
+    use crate::assets::{Light, LightKind, MeshData, Primitive};
     use crate::edit::Edit;
     use crate::import::Imported;
     use crate::node::Node;

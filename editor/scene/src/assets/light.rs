@@ -61,6 +61,35 @@ impl Light {
         };
         self.color.is_finite() && self.intensity.is_finite() && shape.iter().all(|v| v.is_finite())
     }
+
+    /// What no lamp can be, in words.
+    pub fn faults(&self) -> Vec<&'static str> {
+        use std::f32::consts::{FRAC_PI_2, PI};
+        let (range_m, cone, sun_rad) = match self.kind {
+            LightKind::Point { range_m, .. } => (range_m, None, 0.0),
+            LightKind::Spot { range_m, inner_rad, outer_rad, .. } => {
+                (range_m, Some((inner_rad, outer_rad)), 0.0)
+            }
+            LightKind::Directional { angular_radius_rad } => (None, None, angular_radius_rad),
+        };
+        let faults = [
+            (
+                self.color.min_element() < 0.0 || self.intensity < 0.0,
+                "it takes light away: its intensity is below 0",
+            ),
+            (
+                range_m.is_some_and(|range_m| range_m <= 0.0),
+                "its range ends where it stands: it lights nothing",
+            ),
+            (cone.is_some_and(|(inner, outer)| inner > outer), "its inner cone is wider than the outer one"),
+            (
+                cone.is_some_and(|(_, outer)| !(0.0..=FRAC_PI_2).contains(&outer)),
+                "its cone is no cone: 0 to 90 degrees from the axis",
+            ),
+            (!(0.0..=PI).contains(&sun_rad), "it is seen under more than the whole sky"),
+        ];
+        faults.into_iter().filter(|(is_so, _)| *is_so).map(|(_, words)| words).collect()
+    }
 }
 
 /// A camera; it looks along its node's -Z, +Y is up, the node's scale does not act on it.

@@ -20,9 +20,14 @@ const CASES: &str = "
         return bsdf_begin(s, sides, local, s.view * local);
     }";
 
+/// `values` numbers of each of `count` invocations of `body`.
+fn run_cases(functions: &str, body: &str, values: usize, count: usize) -> Vec<f32> {
+    let includes = &["lib/bsdf.glsl", "lib/random.glsl"];
+    run(&mut session(), &Snippet { includes, functions, body, values, count, ..Snippet::default() })
+}
+
 #[test]
 fn what_is_drawn_is_what_is_evaluated() {
-    let mut session = session();
     let body = "
         Surface s;
         mat3 local;
@@ -46,18 +51,7 @@ fn what_is_drawn_is_what_is_evaluated() {
             }
         }
         write(0u, worst_pdf); write(1u, worst_value); write(2u, bad); write(3u, energy); write(4u, s.roughness);";
-    let functions = format!("{SURFACE}{CASES}");
-    let values = run(
-        &mut session,
-        &Snippet {
-            includes: &["lib/bsdf.glsl", "lib/random.glsl"],
-            functions: &functions,
-            body,
-            values: 5,
-            count: 512,
-            ..Snippet::default()
-        },
-    );
+    let values = run_cases(&format!("{SURFACE}{CASES}"), body, 5, 512);
     for (i, row) in values.chunks_exact(5).enumerate() {
         let label = format!("case {i}, roughness {}: {row:?}", row[4]);
         assert_eq!(row[2], 0.0, "not finite: {label}");
@@ -73,7 +67,6 @@ fn what_is_drawn_is_what_is_evaluated() {
 /// Whatever is evaluated is drawn, too: inside of rough glass some microfacets let light through where the surface as a whole reflects totally.
 #[test]
 fn all_that_is_evaluated_is_drawn() {
-    let mut session = session();
     let body = "
         Surface s;
         mat3 local;
@@ -91,18 +84,7 @@ fn all_that_is_evaluated_is_drawn() {
             expected += bsdf_evaluate(bsdf, v, l).value.x * sin(angle) * (PI * TAU / float(N));
         }
         write(0u, drawn); write(1u, expected); write(2u, s.roughness);";
-    let functions = format!("{SURFACE}{CASES}");
-    let values = run(
-        &mut session,
-        &Snippet {
-            includes: &["lib/bsdf.glsl", "lib/random.glsl"],
-            functions: &functions,
-            body,
-            values: 3,
-            count: 512,
-            ..Snippet::default()
-        },
-    );
+    let values = run_cases(&format!("{SURFACE}{CASES}"), body, 3, 512);
     let rough = values.chunks_exact(3).enumerate().filter(|(_, row)| row[2] > 0.5);
     for (case, row) in rough {
         assert!(
@@ -117,7 +99,6 @@ fn all_that_is_evaluated_is_drawn() {
 /// Chi-square of drawn directions against the integral of the density over cells of (cosine, azimuth), both hemispheres.
 #[test]
 fn densities_are_those_of_the_directions() {
-    let mut session = session();
     // 8 x 4 cells; each invocation draws for one cell count, or integrates the density over one cell.
     let functions = format!(
         "{SURFACE}{CASES}
@@ -149,17 +130,7 @@ fn densities_are_those_of_the_directions() {
             expected += bsdf_evaluate(bsdf, v, l).pdf * (TAU / 16.0);
         }
         write(0u, drawn); write(1u, expected);";
-    let values = run(
-        &mut session,
-        &Snippet {
-            includes: &["lib/bsdf.glsl", "lib/random.glsl"],
-            functions: &functions,
-            body,
-            values: 2,
-            count: 6 * 32,
-            ..Snippet::default()
-        },
-    );
+    let values = run_cases(&functions, body, 2, 6 * 32);
     for (case, cells) in values.chunks_exact(64).enumerate() {
         for (cell, pair) in cells.chunks_exact(2).enumerate() {
             let (drawn, expected) = (f64::from(pair[0]), f64::from(pair[1]));

@@ -51,10 +51,12 @@ pub(crate) fn record(
         rows: band.rows.clone(),
     };
     if band.first {
-        // Dropped samples are counted since the last reset, rays in each frame anew.
-        let anew = std::mem::offset_of!(FrameCounters, shadow_rays) as u64;
-        let from = if constants.accumulated == 0 { 0 } else { anew };
-        recorder.clear_buffer(&view.counters.device, from..view.counters.device.size());
+        // Dropped samples are counted since the last reset, rays, where they are counted, in each frame anew.
+        let rays = std::mem::offset_of!(FrameCounters, shadow_rays) as u64;
+        let from = (constants.accumulated == 0).then_some(0).or(needs.known_shadows.then_some(rays));
+        if let Some(from) = from {
+            recorder.clear_buffer(&view.counters.device, from..view.counters.device.size());
+        }
     }
     let parity = (view.frame_count % 2) as usize;
     view.seen = Some(parity);

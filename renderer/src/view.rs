@@ -40,8 +40,8 @@ pub struct View {
     extent: [u32; 2],
     pub(crate) accumulation: Accumulation,
     pub(crate) statistics: Statistics,
-    /// Instance slots that are outlined, as a bit set; made anew when they change.
-    selection: Option<Buffer>,
+    /// Instance slots that are outlined, as a bit set, and its copy for the device; made anew when they change.
+    selection: Option<(Vec<u32>, Buffer)>,
     selection_revision: u64,
     /// Targets of the present extent, with what they were made for; made at the first frame.
     pub(crate) targets: Option<((Needs, Pipeline), Targets)>,
@@ -172,25 +172,25 @@ impl View {
 
     /// Outlines the instance slots of a bit set.
     pub(crate) fn set_selection(&mut self, bits: &[u32]) -> Result<()> {
-        let bytes: &[u8] = bytemuck::cast_slice(bits);
-        if self.selection.as_ref().map_or(&[][..], Buffer::mapped) == bytes {
+        // Memory that is written for the device may be slow to read.
+        if self.selection.as_ref().map_or(&[][..], |(bits, _)| bits) == bits {
             return Ok(());
         }
         self.selection = None;
         self.selection_revision += 1;
-        if !bytes.is_empty() {
+        if !bits.is_empty() {
             let (usage, kind) = (BufferUse::General, MemoryUse::Tables);
-            let size = bytes.len() as u64;
+            let size = size_of_val(bits) as u64;
             let mut buffer = Buffer::new(&self.device, "selection", size, usage, Location::Upload, kind)?;
-            buffer.mapped_mut().copy_from_slice(bytes);
-            self.selection = Some(buffer);
+            buffer.mapped_mut().copy_from_slice(bytemuck::cast_slice(bits));
+            self.selection = Some((bits.to_vec(), buffer));
         }
         Ok(())
     }
 
     /// Device address of the bit set of the outlined slots and how many slots it covers; 0 when nothing is outlined.
     pub(crate) fn selection(&self) -> (u64, u32) {
-        self.selection.as_ref().map_or((0, 0), |bits| (bits.address(), bits.size() as u32 * 8))
+        self.selection.as_ref().map_or((0, 0), |(bits, buffer)| (buffer.address(), bits.len() as u32 * 32))
     }
 
     /// Starts the sample set at `offset`. Resets the view.

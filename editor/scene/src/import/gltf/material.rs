@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::json::{Fault, Item, held};
 use super::texture::TextureTable;
-use crate::assets::{AlphaMode, Material, ShadingMode, TextureUse};
+use crate::assets::{AlphaMode, MAX_RADIANCE, Material, ShadingMode, TextureUse};
 
 mod lobes;
 
@@ -77,7 +77,7 @@ impl Reader<'_> {
     fn extensions(&mut self, item: &Item<'_>, material: &mut Material) -> Result<(), Fault> {
         if let Some(extension) = item.extension("KHR_materials_emissive_strength")? {
             material.emissive_strength =
-                self.within(&extension, "emissiveStrength", 1.0, 0.0..=crate::assets::MAX_RADIANCE)?;
+                self.within(&extension, "emissiveStrength", 1.0, 0.0..=MAX_RADIANCE)?;
         }
         if let Some(extension) = item.extension("KHR_materials_ior")? {
             material.ior = match extension.f32_or("ior", 1.5)? {

@@ -126,7 +126,7 @@ impl Audit<'_> {
             self.add(Severity::Error, Subject::Prefab(id), &prefab.name, message);
         }
         for (id, node) in self.document.nodes() {
-            let NodeKind::Prefab { prefab, overrides, clip } = &node.kind else {
+            let NodeKind::Prefab { prefab, overrides, clip, variant } = &node.kind else {
                 continue;
             };
             let Some(prefab) = self.document.prefab(*prefab).filter(|p| !p.missing) else {
@@ -139,6 +139,11 @@ impl Audit<'_> {
                 let message = format!(
                     "it stands still: it is to play clip {index}, the source has {count}; choose another"
                 );
+                self.add(Severity::Warning, Subject::Target(Target::node(id)), &node.name, message);
+            }
+            if let Some(name) = variant.as_ref().filter(|name| !prefab.variants().contains(name)) {
+                let message =
+                    format!("it is to be shown in {name}, which the source does not have; choose another");
                 self.add(Severity::Warning, Subject::Target(Target::node(id)), &node.name, message);
             }
             let lost = overrides.keys().filter(|path| prefab.part_at(path).is_none());

@@ -19,9 +19,12 @@ use crate::transform::Local;
 
 mod apply;
 mod apply_animation;
+mod apply_instance;
 mod apply_prefab;
 mod apply_shapes;
 mod apply_tree;
+mod copies;
+mod lock;
 mod place;
 mod pose;
 mod propagate;
@@ -84,6 +87,8 @@ struct PartStates {
     shown: Vec<bool>,
     /// The overrides by index instead of by path; those without a part are left out.
     overrides: BTreeMap<u32, PartOverride>,
+    /// What the variant of materials chooses, by mesh and primitive.
+    varied: BTreeMap<(MeshId, u32), MaterialId>,
     /// What the time that is shown lays over them; instances in the same pose share it.
     pose: Arc<Pose>,
 }

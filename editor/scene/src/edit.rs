@@ -35,6 +35,13 @@ pub enum Edit {
         /// True: shown.
         visible: bool,
     },
+    /// Keeps a node with everything below it from being changed, or lets go of it. [`Document::locked_against`] tells.
+    SetLocked {
+        /// Which node.
+        node: NodeId,
+        /// True: kept.
+        locked: bool,
+    },
     /// Says which rays meet the mesh of a node or part; what hangs below does not follow.
     SetRayVisibility {
         /// What it is about.
@@ -57,6 +64,20 @@ pub enum Edit {
         node: NodeId,
         /// The clips.
         clip: ClipChoice,
+    },
+    /// Chooses the variant of materials that an instance shows.
+    SetVariant {
+        /// The instance.
+        node: NodeId,
+        /// Its name in [`crate::Prefab::variants`]; `None`: the materials that the meshes have.
+        variant: Option<String>,
+    },
+    /// Lets an instance show another prefab. Overrides stay, by path.
+    SetPrefab {
+        /// The instance.
+        node: NodeId,
+        /// The other prefab.
+        prefab: PrefabId,
     },
     /// Makes a part follow its prefab again in one respect.
     ResetOverride {
@@ -242,6 +263,15 @@ pub enum EditError {
         /// Number of weights.
         found: usize,
     },
+    /// Somebody has locked it.
+    #[error("{0} is locked")]
+    Locked(String),
+    /// The prefab has no such variant of materials.
+    #[error("there is no variant {0}")]
+    NoVariant(String),
+    /// No other instance shows the prefab.
+    #[error("it is the only instance already")]
+    OnlyInstance,
     /// An id is taken.
     #[error("{0} is already in the scene")]
     Taken(String),
@@ -279,7 +309,7 @@ impl Edit {
     /// Whether the picture may be another afterwards.
     pub fn changes_picture(&self) -> bool {
         match self {
-            Self::Rename { .. } | Self::SetDefaultCamera(_) => false,
+            Self::Rename { .. } | Self::SetLocked { .. } | Self::SetDefaultCamera(_) => false,
             Self::Batch { edits, .. } => edits.iter().any(Self::changes_picture),
             _ => true,
         }
@@ -305,11 +335,19 @@ impl Edit {
             Self::SetVisible { target, visible } => {
                 format!("{} {}", if *visible { "showed" } else { "hid" }, name(target))
             }
+            Self::SetLocked { node, locked } => {
+                format!("{} {}", if *locked { "locked" } else { "unlocked" }, name(&Target::node(*node)))
+            }
             Self::SetRayVisibility { target, .. } => {
                 format!("changed the ray visibility of {}", name(target))
             }
             Self::SetMorphWeights { target, .. } => format!("shaped {}", name(target)),
             Self::SetClip { node, clip } => describe_clip(document, *node, *clip),
+            Self::SetVariant { node, variant } => {
+                let variant = variant.as_deref().unwrap_or("its own materials");
+                format!("showed {} in {variant}", name(&Target::node(*node)))
+            }
+            Self::SetPrefab { node, .. } => format!("gave {} another source", name(&Target::node(*node))),
             Self::ResetOverride { target, .. } => format!("reset {}", name(target)),
             Self::AssignMaterial { target, material, .. } => {
                 format!("gave {} to {}", material_name(material), name(target))

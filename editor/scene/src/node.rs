@@ -24,6 +24,8 @@ pub struct Node {
     pub local: Local,
     /// False: it and everything below is hidden.
     pub visible: bool,
+    /// True: it and everything below is kept from being changed.
+    pub locked: bool,
     /// Which rays meet the mesh that it places; nothing below follows it.
     pub ray_visibility: RayVisibility,
     /// What it is.
@@ -60,6 +62,9 @@ pub enum NodeKind {
         overrides: BTreeMap<PartPath, PartOverride>,
         /// What it plays.
         clip: ClipChoice,
+        /// The variant of materials that it shows, by name; `None`: those of the meshes. A name that the source no longer
+        /// has is kept.
+        variant: Option<String>,
     },
     /// Places a mesh.
     Mesh {
@@ -79,7 +84,7 @@ pub enum NodeKind {
 impl NodeKind {
     /// An instance of a prefab that follows it in everything.
     pub fn instance_of(prefab: PrefabId) -> Self {
-        Self::Prefab { prefab, overrides: BTreeMap::new(), clip: ClipChoice::default() }
+        Self::Prefab { prefab, overrides: BTreeMap::new(), clip: ClipChoice::default(), variant: None }
     }
 }
 
@@ -92,6 +97,7 @@ impl Node {
             children: Vec::new(),
             local: Local::default(),
             visible: true,
+            locked: false,
             ray_visibility: RayVisibility::default(),
             kind,
         }

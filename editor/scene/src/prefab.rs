@@ -9,10 +9,11 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::animation::Animation;
 use crate::assets::{Camera, Environment, Light};
-use crate::foreign::Foreign;
+use crate::foreign::{Foreign, Mapping};
 use crate::ids::{MaterialId, MeshId, TextureId};
 use crate::node::RayVisibility;
 use crate::transform::Local;
@@ -211,6 +212,28 @@ impl Prefab {
     /// Whether anything in it can move by itself.
     pub fn is_animated(&self) -> bool {
         self.animations.iter().any(|clip| !clip.channels.is_empty())
+    }
+
+    /// Names of its variants of materials (KHR_materials_variants) in the order of the file; the n-th without a name is
+    /// `variant n`.
+    pub fn variants(&self) -> Vec<String> {
+        let name = |(place, value): (usize, &Value)| match value.get("name").and_then(Value::as_str) {
+            Some(name) if !name.is_empty() => name.to_owned(),
+            _ => format!("variant {}", place + 1),
+        };
+        self.foreign.variants.iter().enumerate().map(name).collect()
+    }
+
+    /// The materials that a variant chooses, by mesh and primitive; the others keep that of the mesh.
+    pub(crate) fn variant_materials(&self, name: &str) -> BTreeMap<(MeshId, u32), MaterialId> {
+        let Some(variant) = self.variants().iter().position(|known| known == name) else {
+            return BTreeMap::new();
+        };
+        let chosen = |(&(mesh, primitive), mappings): (&(usize, usize), &Vec<Mapping>)| {
+            let mapping = mappings.iter().find(|mapping| mapping.variants.contains(&variant))?;
+            Some(((*self.meshes.get(mesh)?, primitive as u32), *self.materials.get(mapping.material)?))
+        };
+        self.foreign.mappings.iter().filter_map(chosen).collect()
     }
 
     /// Puts other mesh ids in place.

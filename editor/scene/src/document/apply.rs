@@ -45,6 +45,9 @@ impl Document {
             }
             Edit::SetMorphWeights { target, weights } => self.set_morph_weights(target, weights),
             Edit::SetClip { node, clip } => self.set_clip(node, clip),
+            Edit::SetLocked { node, locked } => self.set_locked(node, locked),
+            Edit::SetVariant { node, variant } => self.set_variant(node, variant),
+            Edit::SetPrefab { node, prefab } => self.set_prefab(node, prefab),
             Edit::ResetOverride { target, field } => self.reset_override(target, field),
             Edit::AssignMaterial { target, primitive, material } => {
                 self.assign_material(target, primitive, material)

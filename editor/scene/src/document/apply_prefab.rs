@@ -98,12 +98,7 @@ impl Document {
         self.take_package(&old);
         self.insert_package(package);
         for node in instances {
-            let parts = self.node(node).map(|node| self.part_states(node));
-            if let (Some(parts), Some(slot)) = (parts, self.slots.get_mut(&node)) {
-                slot.parts = parts;
-            }
-            self.mark_dirty(node);
-            self.report_added(node);
+            self.state_parts(node);
         }
         self.report_users(&changed);
         Ok(Edit::ReplacePrefab(Box::new(old)))

@@ -159,11 +159,14 @@ impl Document {
         (0..).zip(&mesh.primitives).map(|(index, p)| self.material_at(target, index, p.material)).collect()
     }
 
-    /// Material of a placed primitive: the override where there is one and it is in the document, else the
-    /// mesh's own.
+    /// Material of a placed primitive: the override where there is one and it is in the document, else that of the
+    /// variant, else the mesh's own.
     pub(super) fn material_at(&self, target: Target, primitive: u32, of_mesh: MaterialId) -> MaterialId {
         let chosen = match target.part {
-            Some(_) => self.part_override(target).and_then(|o| o.materials.get(&primitive)),
+            Some(_) => {
+                let own = self.part_override(target).and_then(|o| o.materials.get(&primitive));
+                own.or_else(|| self.varied_material(target, primitive))
+            }
             None => match self.node(target.node).map(|node| &node.kind) {
                 Some(NodeKind::Mesh { materials, .. }) => materials.get(primitive as usize),
                 _ => None,

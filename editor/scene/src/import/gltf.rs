@@ -78,7 +78,7 @@ fn read(
     prefab.animations = animations;
     prefab.set_skins(skins);
     prefab.set_nodes(tree.parts).map_err(|error| Fault::new("/nodes", error.to_string()))?;
-    let faults = left_out_warnings(&root, &left_out, &foreign)?
+    let faults = left_out_warnings(&left_out, &foreign)
         .into_iter()
         .chain(material_warnings)
         .chain(meshes.warnings)
@@ -93,16 +93,11 @@ fn read(
 }
 
 /// What the file has and the program does not show.
-fn left_out_warnings(root: &Item<'_>, extensions: &[String], foreign: &Foreign) -> Result<Vec<Fault>, Fault> {
+fn left_out_warnings(extensions: &[String], foreign: &Foreign) -> Vec<Fault> {
     let kept: BTreeSet<&String> = foreign.all().flat_map(|object| object.extensions.keys()).collect();
     let warning = |name: &String| {
         let what = if kept.contains(name) { "is only kept for exports" } else { "is left out" };
         Fault::new("/extensionsUsed", format!("{name} is not supported and {what}"))
     };
-    let mut warnings: Vec<Fault> = extensions.iter().map(warning).collect();
-    if root.extension("KHR_materials_variants")?.is_some() {
-        let message = "of the material variants the default one is shown";
-        warnings.push(Fault::new("/extensions/KHR_materials_variants", message));
-    }
-    Ok(warnings)
+    extensions.iter().map(warning).collect()
 }

@@ -201,9 +201,10 @@ impl Loader<'_> {
             self.meta.kept.nodes.insert(id.0, record.other);
         }
         let kind = match record {
-            NodeRecord { prefab: Some(prefab), overrides, clip, .. } => NodeKind::Prefab {
+            NodeRecord { prefab: Some(prefab), overrides, clip, variant, .. } => NodeKind::Prefab {
                 prefab,
                 clip,
+                variant,
                 overrides: overrides.into_iter().map(|(path, value)| (path, value.into())).collect(),
             },
             NodeRecord { mesh: Some(mesh), materials, weights, .. } => {
@@ -215,6 +216,7 @@ impl Loader<'_> {
         };
         let node = Node {
             visible: record.visible,
+            locked: record.locked,
             ray_visibility: record.ray_visibility,
             local: record.local.into(),
             ..Node::new(record.name, kind)

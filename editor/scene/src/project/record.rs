@@ -167,6 +167,8 @@ pub(super) struct NodeRecord {
     #[serde(default = "yes", skip_serializing_if = "is_true")]
     pub visible: bool,
     #[serde(default, skip_serializing_if = "is_default")]
+    pub locked: bool,
+    #[serde(default, skip_serializing_if = "is_default")]
     pub ray_visibility: RayVisibility,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prefab: Option<PrefabId>,
@@ -175,6 +177,9 @@ pub(super) struct NodeRecord {
     /// `"none"`, `"all"` or `{"clip": 2}`; absent: the first.
     #[serde(default, skip_serializing_if = "is_default")]
     pub clip: ClipChoice,
+    /// Name of the variant of materials; absent: those of the meshes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variant: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshId>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -128,10 +128,12 @@ fn node(id: NodeId, node: &Node, meta: &ProjectMeta) -> NodeRecord {
         parent: node.parent,
         local: node.local.into(),
         visible: node.visible,
+        locked: node.locked,
         ray_visibility: node.ray_visibility,
         prefab: None,
         overrides: BTreeMap::new(),
         clip: ClipChoice::default(),
+        variant: None,
         mesh: None,
         materials: Vec::new(),
         weights: Vec::new(),
@@ -141,8 +143,9 @@ fn node(id: NodeId, node: &Node, meta: &ProjectMeta) -> NodeRecord {
     };
     match &node.kind {
         NodeKind::Group => {}
-        NodeKind::Prefab { prefab, overrides, clip } => {
+        NodeKind::Prefab { prefab, overrides, clip, variant } => {
             record.prefab = Some(*prefab);
+            record.variant.clone_from(variant);
             record.clip = *clip;
             let overrides = overrides.iter();
             record.overrides =

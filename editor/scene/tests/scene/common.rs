@@ -106,10 +106,10 @@ fn assert_skins_fit(path: &Path, imported: &Imported) {
     }
 }
 
-/// Two triangles with two materials below a turned node, a lamp and a camera.
+/// Two triangles with two materials, which a variant exchanges for one, below a turned node, a lamp and a camera.
 const MODEL: &str = r#"{"asset":{"version":"2.0"},
- "extensionsUsed":["KHR_lights_punctual"],
- "extensions":{"KHR_lights_punctual":{"lights":[
+ "extensionsUsed":["KHR_lights_punctual","KHR_materials_variants"],
+ "extensions":{"KHR_materials_variants":{"variants":[{"name":"plain"},{"name":"glowing"}]},"KHR_lights_punctual":{"lights":[
    {"type":"point","intensity":100,"color":[1,0.5,0.25],"extras":{"radius":0.25}}]}},
  "nodes":[
   {"name":"Root","translation":[1,0,0],"children":[1,2]},
@@ -120,7 +120,8 @@ const MODEL: &str = r#"{"asset":{"version":"2.0"},
  "materials":[{"name":"Red","pbrMetallicRoughness":{"baseColorFactor":[0.8,0.1,0.1,1]}},
   {"name":"Glow","emissiveFactor":[1,1,1]}],
  "meshes":[{"name":"Plates","primitives":[
-  {"attributes":{"POSITION":0},"material":0},{"attributes":{"POSITION":0},"material":1}]}],
+  {"attributes":{"POSITION":0},"material":0,"extensions":{"KHR_materials_variants":{"mappings":[
+   {"material":0,"variants":[0]},{"material":1,"variants":[1]}]}}},{"attributes":{"POSITION":0},"material":1}]}],
  "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
  "bufferViews":[{"buffer":0,"byteLength":36}],
  "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;

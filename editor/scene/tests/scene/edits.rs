@@ -33,6 +33,8 @@ fn every_edit(scene: &mut Scene) -> Vec<Edit> {
             .collect(),
     };
     let (_, duplicate) = document.duplicate_edit(group).unwrap();
+    let unique = document.make_unique_edit(first).unwrap();
+    let (_, merged) = document.merge_edit(&document.clone(), "again").unwrap();
     let mut edits = vec![
         Edit::Rename { target: first.into(), name: "other".into() },
         Edit::Rename { target: plate, name: "lid".into() },
@@ -63,6 +65,10 @@ fn every_edit(scene: &mut Scene) -> Vec<Edit> {
         ),
         duplicate,
         Edit::SetClip { node: first, clip: ClipChoice::All },
+        unique,
+        merged,
+        Edit::SetLocked { node: group, locked: true },
+        Edit::SetVariant { node: first, variant: Some("glowing".into()) },
     ];
     for target in [Target::node(first), plate, Target::part(first, ARM)] {
         edits.push(Edit::SetRayVisibility { target, camera_visible: false, casts_shadows: true });

@@ -42,6 +42,8 @@ fn edited(folder: &std::path::Path) -> Scene {
         Edit::SetEnvironment(Environment::Constant(Vec3::new(0.1, 0.2, 0.3))),
         Edit::SetDefaultCamera(Some(plate)),
         Edit::SetClip { node: scene.second, clip: ClipChoice::Clip(3) },
+        Edit::SetVariant { node: scene.second, variant: Some("glowing".into()) },
+        Edit::SetLocked { node: scene.second, locked: true },
         Edit::SetRayVisibility { target: plate, camera_visible: false, casts_shadows: true },
         Edit::SetRayVisibility { target: scene.second.into(), camera_visible: true, casts_shadows: false },
     ] {

@@ -1,0 +1,63 @@
+//! Variants of materials (KHR_materials_variants): chosen for an instance, kept by name.
+
+use crate::common::{PLATE, Scene, model, scene};
+use caustica_scene::import::Imported;
+use caustica_scene::{Edit, EditError, MaterialId, Target, audit};
+
+fn materials(scene: &Scene, target: Target) -> Vec<MaterialId> {
+    scene.document.renderable(target).unwrap().materials
+}
+
+fn choose(variant: &str) -> impl Fn(&Scene) -> Edit {
+    move |scene| Edit::SetVariant { node: scene.first, variant: Some(variant.to_owned()) }
+}
+
+#[test]
+fn a_variant_is_that_of_one_instance_and_gives_way_to_overrides() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = scene(folder.path());
+    let prefab = scene.document.prefab(scene.prefab).unwrap();
+    assert_eq!(prefab.variants(), ["plain", "glowing"]);
+    let [red, glow] = prefab.materials[..] else { panic!("two materials") };
+    let (plate, other) = (scene.part(PLATE), Target::part(scene.second, PLATE));
+    scene.document.drain_changes();
+    let undo = scene.document.apply(choose("glowing")(&scene)).unwrap();
+    let changes = scene.document.drain_changes();
+    assert_eq!(changes.instances.keys().collect::<Vec<_>>(), [&plate], "only what shows it");
+    assert_eq!(materials(&scene, plate), [glow, glow]);
+    assert_eq!(materials(&scene, other), [red, glow]);
+    scene.document.apply(Edit::AssignMaterial { target: plate, primitive: 0, material: red }).unwrap();
+    assert_eq!(materials(&scene, plate), [red, glow], "an override says more");
+    scene.document.apply(undo).unwrap();
+    assert_eq!(scene.document.variant_of(scene.first), None);
+    let unknown = scene.document.apply(choose("blue")(&scene)).unwrap_err();
+    assert_eq!(unknown, EditError::NoVariant("blue".into()));
+}
+
+#[test]
+fn a_variant_that_the_source_has_lost_is_kept_and_told_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = scene(folder.path());
+    scene.document.apply(choose("glowing")(&scene)).unwrap();
+    let reload = |scene: &mut Scene, imported: Imported| {
+        let edit = scene.document.reload_edit(scene.prefab, imported).unwrap();
+        scene.document.apply(edit).unwrap()
+    };
+    let mut without = model(folder.path());
+    let path = folder.path().join("other.gltf");
+    let text = std::fs::read_to_string(folder.path().join("model.gltf")).unwrap();
+    std::fs::write(&path, text.replace("glowing", "dull")).unwrap();
+    std::mem::swap(
+        &mut without,
+        &mut caustica_scene::import::load(&path, &caustica_scene::import::ImportOptions::default()).unwrap(),
+    );
+    let undo = reload(&mut scene, without);
+    let own = scene.document.mesh(scene.document.mesh_of(scene.part(PLATE)).unwrap()).unwrap();
+    let own: Vec<MaterialId> = own.primitives.iter().map(|primitive| primitive.material).collect();
+    assert_eq!(materials(&scene, scene.part(PLATE)), own);
+    assert_eq!(scene.document.variant_of(scene.first), Some("glowing"));
+    assert!(audit(&scene.document).iter().any(|finding| finding.message.contains("shown in glowing")));
+    scene.document.apply(undo).unwrap();
+    let glow = scene.document.prefab(scene.prefab).unwrap().materials[1];
+    assert_eq!(materials(&scene, scene.part(PLATE)), [glow, glow]);
+}

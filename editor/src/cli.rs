@@ -63,7 +63,7 @@ pub(crate) struct DeviceArgs {
     /// Load the Vulkan validation layer and log its messages
     #[arg(long, global = true)]
     validation: bool,
-    /// Refuse to use more than this much device memory
+    /// Use no more device memory than this: textures go without their largest levels, what cannot fit is refused
     #[arg(long, value_name = "MIB", global = true)]
     memory_budget: Option<u64>,
 }

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use caustica_scene::PrefabId;
 use egui_file_dialog::{DialogState, FileDialog};
 
 use crate::worker::{Answer, Job, Wake};
@@ -27,8 +28,10 @@ pub const PROJECT_ENDING: &str = "caustica.json";
 pub enum Wish {
     /// A project or model to open as a new scene.
     Open,
-    /// A model, or spheres and boxes, to add to the scene.
+    /// A model, a project, or spheres and boxes, to add to the scene.
     Import,
+    /// A model in the place of a prefab's source.
+    Source(PrefabId),
     /// An image to surround the scene.
     Environment,
     /// Where to write the project.
@@ -41,7 +44,8 @@ impl Wish {
     fn title(self) -> &'static str {
         match self {
             Self::Open => "Open a scene",
-            Self::Import => "Import a model",
+            Self::Import => "Import into the scene",
+            Self::Source(_) => "Choose another source",
             Self::Environment => "Choose an environment image",
             Self::SaveAs => "Save the project as",
             Self::Export => "Export the scene as glTF",
@@ -51,7 +55,8 @@ impl Wish {
     fn filter(self) -> (&'static str, Vec<&'static str>) {
         match self {
             Self::Open => ("Scenes", [&["json"][..], &MODEL_ENDINGS, &SHAPE_ENDINGS].concat()),
-            Self::Import => ("Models", [MODEL_ENDINGS, SHAPE_ENDINGS].concat()),
+            Self::Import => ("Models", [&MODEL_ENDINGS[..], &SHAPE_ENDINGS, &["json"]].concat()),
+            Self::Source(_) => ("Models", MODEL_ENDINGS.to_vec()),
             Self::Environment => ("Environments", ENVIRONMENT_ENDINGS.to_vec()),
             Self::SaveAs => ("Caustica projects", vec!["json"]),
             Self::Export => ("glTF", EXPORT_ENDINGS.to_vec()),

@@ -22,6 +22,7 @@ pub mod overlays;
 pub mod render;
 pub mod reports;
 pub mod shapes;
+pub mod source;
 pub mod timeline;
 pub mod view;
 pub mod view_input;

@@ -6,6 +6,7 @@ mod files;
 mod frame;
 mod host_times;
 mod inventory;
+mod room;
 mod tally;
 
 use std::collections::BTreeSet;
@@ -17,7 +18,7 @@ use caustica_renderer::gpu::{Device, Frames};
 use caustica_renderer::{
     AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings,
 };
-use caustica_scene::{Document, Edit, EditError, Local, NodeId, ProjectMeta, ShapeSource, Target};
+use caustica_scene::{Document, Edit, EditError, Local, NodeId, PrefabId, ProjectMeta, ShapeSource, Target};
 use glam::DVec3;
 
 pub use camera::ViewCamera;
@@ -166,8 +167,11 @@ impl Session {
     /// Applies an edit and notes how to undo it. Edits of one gesture become one step.
     ///
     /// # Errors
-    /// When the edit does not fit the document, which stays as it was.
+    /// When the edit does not fit the document or touches what is locked; the document stays as it was.
     pub fn push(&mut self, edit: Edit) -> Result<(), EditError> {
+        if let Some(lock) = self.document.locked_against(&edit) {
+            return Err(EditError::Locked(self.document.display_name(lock.into())));
+        }
         let label = edit.describe(&self.document);
         self.note_picture(&edit);
         let inverse = Arc::make_mut(&mut self.document).apply(edit.clone())?;
@@ -244,7 +248,7 @@ impl Session {
     /// Replaces the document with what was loaded. The history starts anew.
     ///
     /// # Errors
-    /// When the model does not fit; the open document stays as it was.
+    /// When the scene does not fit on the device, or contradicts itself; the open document stays as it was.
     pub fn open(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
         self.open_at(path, loaded, None)
     }
@@ -256,6 +260,7 @@ impl Session {
     /// As [`Self::open`].
     pub fn open_at(&mut self, path: &Path, loaded: Loaded, time_s: Option<f64>) -> anyhow::Result<()> {
         let opened = files::open(path, loaded)?;
+        room::check(&opened.document, self.device.memory_budget())?;
         self.meta = opened.meta;
         self.path = opened.path;
         self.replace_scene(opened.document, "opened a file")?;
@@ -315,20 +320,44 @@ impl Session {
         Ok(())
     }
 
-    /// Brings what was loaded into the scene as one undo step: a model becomes a new node, an environment replaces
-    /// the present one. Returns the new node.
+    /// Brings what was loaded into the scene as one undo step: a model or project becomes a new node, an environment
+    /// replaces the present one. Returns the new node.
     ///
     /// # Errors
-    /// For a project, which can only be opened, and when the edit does not fit.
-    pub fn import(&mut self, loaded: Loaded) -> anyhow::Result<Option<NodeId>> {
+    /// When the edit does not fit, or the scene with it on the device; the document stays as it was.
+    pub fn import(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<Option<NodeId>> {
         let was_empty = self.document.node_count() == 0;
-        let node = files::import(Arc::make_mut(&mut self.document), loaded)?;
+        let node = files::import(Arc::make_mut(&mut self.document), path, loaded)?;
         let (edit, node) = (node.edit, node.node);
+        let mut with_it = Document::clone(&self.document);
+        with_it.apply(edit.clone())?;
+        room::check(&with_it, self.device.memory_budget())?;
         self.push(edit)?;
         if was_empty {
             self.camera = ViewCamera::of_document(&self.document, None, self.aspect());
         }
         Ok(node)
+    }
+
+    /// Gives an instance a prefab of its own, a copy of that which it shares with others.
+    ///
+    /// # Errors
+    /// When the node is no instance, or shares its prefab with none.
+    pub fn make_unique(&mut self, node: NodeId) -> Result<(), EditError> {
+        let edit = Arc::make_mut(&mut self.document).make_unique_edit(node)?;
+        self.push(edit)
+    }
+
+    /// Puts what was loaded in the place of a prefab's source, as one undo step. Instances keep their overrides.
+    ///
+    /// # Errors
+    /// When it is no model.
+    pub fn replace_source(&mut self, prefab: PrefabId, loaded: Loaded) -> anyhow::Result<()> {
+        let Loaded::Model(imported) = loaded else {
+            anyhow::bail!("only a model (.gltf, .glb, .obj) can be the source of an instance")
+        };
+        let edit = Arc::make_mut(&mut self.document).reload_edit(prefab, *imported)?;
+        Ok(self.push(edit)?)
     }
 
     /// Saves the project, with camera and settings of the view.

@@ -94,7 +94,7 @@ pub enum RendererError {
 
 impl RendererError {
     /// Whether memory ran out: less of it may do.
-    pub(crate) fn is_out_of_memory(&self) -> bool {
+    pub fn is_out_of_memory(&self) -> bool {
         matches!(self, Self::Gpu(GpuError::OutOfMemory { .. }))
     }
 }

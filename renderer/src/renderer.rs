@@ -9,7 +9,7 @@ use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse
 use glam::Vec3;
 
 use crate::accel::{Accel, AccelPolicy};
-use crate::delta::{InstanceId, Invalidation, SceneDelta};
+use crate::delta::{Camera, InstanceId, Invalidation, SceneDelta};
 use crate::error::{RendererError, Result};
 use crate::frame;
 use crate::gpu_types::AccumulatorPixel;
@@ -71,6 +71,8 @@ pub struct Renderer {
     summary: Summary,
     changed: Changed,
     picked: Buffer,
+    /// Cameras and sizes of all views when the scene was brought up to date last.
+    last_views: Vec<(Camera, [u32; 2])>,
 }
 
 impl Renderer {
@@ -98,6 +100,7 @@ impl Renderer {
             summary: Summary::default(),
             changed: Changed { all: true, ..Changed::default() },
             picked: Buffer::new(device, "pick", 32, BufferUse::General, Location::ReadBack, kind)?,
+            last_views: Vec::new(),
         })
     }
 
@@ -121,6 +124,15 @@ impl Renderer {
         }
         if self.changed.all || !delta.is_empty() {
             self.summary.follow(delta, &mut self.tables, self.changed.all);
+        }
+        let views: Vec<(Camera, [u32; 2])> =
+            self.views.values().map(|view| (*view.camera(), view.extent())).collect();
+        let at_rest = delta.is_empty() && views == self.last_views;
+        let matrices: Vec<_> =
+            views.iter().map(|(camera, extent)| (CameraMatrices::of(camera, *extent), *extent)).collect();
+        self.last_views = views;
+        if self.tables.settle_textures(recorder, at_rest, &matrices)? {
+            self.invalidate(Invalidation::Scene, "detail of textures");
         }
         let slot = recorder.slot();
         let mut changed = std::mem::take(&mut self.changed);
@@ -152,6 +164,17 @@ impl Renderer {
     /// Whether acceleration structures are left to be built or to be made better in later frames.
     pub fn is_busy(&self) -> bool {
         self.accel.is_busy()
+    }
+
+    /// Whether it is still open which levels of the textures have room; [`Self::apply`] goes on with it. At the end views begin anew.
+    pub fn textures_settle(&self) -> bool {
+        self.tables.textures.is_settling()
+    }
+
+    /// Makes room where memory has run out: textures get half of what they have once the whole scene was taken in anew. False: there is no
+    /// more to be had from them.
+    pub fn give_up_textures(&mut self) -> bool {
+        self.tables.textures.give_up_half()
     }
 
     /// What is on the device, by id. Waits for the device.

@@ -16,6 +16,8 @@ mod materials;
 mod meshes;
 mod met;
 mod placement;
+mod residency;
+mod seen;
 mod shapes;
 mod sheen;
 mod snapshot;
@@ -42,6 +44,7 @@ use crate::delta::{InstanceId, MeshId};
 use crate::error::Result;
 use crate::gpu_types;
 use crate::passes::ScenePasses;
+use crate::view::CameraMatrices;
 
 use deforming::Deforming;
 use draws::Draws;
@@ -154,6 +157,27 @@ impl Tables {
         }
         changed.deformed.extend(self.deforming.record(recorder, &passes.deform, self.geometry_group)?);
         Ok(())
+    }
+
+    /// Gives textures the room that is left once everything has been at rest for some frames. True: the picture is another.
+    ///
+    /// # Errors
+    /// When memory runs out.
+    pub(crate) fn settle_textures(
+        &mut self,
+        recorder: &mut Recorder,
+        at_rest: bool,
+        views: &[(CameraMatrices, [u32; 2])],
+    ) -> Result<bool> {
+        self.textures.note(at_rest);
+        if !self.textures.may_settle() {
+            return Ok(false);
+        }
+        recorder.declare(&[Use::Group(self.geometry_group, Stage::Transfer, Access::TransferWrite)]);
+        let seen_px = seen::sizes_px(self, views);
+        let pixels = views.iter().map(|(_, extent)| u64::from(extent[0]) * u64::from(extent[1])).max();
+        let read_back_bytes = pixels.unwrap_or(0) * size_of::<gpu_types::AccumulatorPixel>() as u64;
+        self.textures.settle(recorder, &seen_px, read_back_bytes)
     }
 
     /// Uploads the table of what rough interfaces reflect at once, where it is not there yet.

@@ -63,8 +63,23 @@ pub fn device_options() -> DeviceOptions {
 /// Without a device that can run Caustica, without the validation layer, or when this test holds a session already.
 pub fn session() -> Session {
     assert!(!HELD.replace(true), "this test holds the device already: drop the first session");
-    let turn = Turn::take();
-    let Lent { instance, device } = &turn.0;
+    begin(Turn::take())
+}
+
+/// A device of the test's own that gives out no more than this.
+///
+/// # Panics
+/// As [`session`].
+pub fn session_within(memory_limit_bytes: u64) -> Session {
+    assert!(!HELD.replace(true), "this test holds the device already: drop the first session");
+    let instance = validated_instance();
+    let options = DeviceOptions { memory_limit_bytes: Some(memory_limit_bytes), ..device_options() };
+    let device = Device::new(&instance, &options).expect("no device can run the tests");
+    begin(Turn { lent: Lent { instance, device }, of_pool: false })
+}
+
+fn begin(turn: Turn) -> Session {
+    let Lent { instance, device } = &turn.lent;
     let (instance, device) = (Arc::clone(instance), Arc::clone(device));
     // What an earlier test has said was that test's failure.
     drop(instance.take_messages());
@@ -72,22 +87,25 @@ pub fn session() -> Session {
     Session { instance, device, frames, _turn: turn }
 }
 
-/// A device out of the pool, until it is dropped.
-struct Turn(Lent);
+/// A device, out of the pool until it is dropped, or of a test's own.
+struct Turn {
+    lent: Lent,
+    of_pool: bool,
+}
 
 impl Turn {
     fn take() -> Self {
         let mut pool = pool();
         loop {
             if let Some(lent) = pool.free.pop() {
-                return Self(lent);
+                return Self { lent, of_pool: true };
             }
             if pool.left_to_make > 0 {
                 let instance = validated_instance();
                 let device = Device::new(&instance, &device_options()).expect("no device can run the tests");
                 eprintln!("device: {} ({})", device.name(), device.driver());
                 pool.left_to_make -= 1;
-                return Self(Lent { instance, device });
+                return Self { lent: Lent { instance, device }, of_pool: true };
             }
             pool = RETURNED.wait(pool).unwrap_or_else(PoisonError::into_inner);
         }
@@ -96,7 +114,11 @@ impl Turn {
 
 impl Drop for Turn {
     fn drop(&mut self) {
-        let lent = Lent { instance: Arc::clone(&self.0.instance), device: Arc::clone(&self.0.device) };
+        if !self.of_pool {
+            return;
+        }
+        let Lent { instance, device } = &self.lent;
+        let lent = Lent { instance: Arc::clone(instance), device: Arc::clone(device) };
         pool().free.push(lent);
         RETURNED.notify_one();
     }

@@ -5,7 +5,7 @@ use caustica_renderer::{
     AccelPolicy, Accumulated, Renderer, RendererOptions, Statistics, View, ViewId, ViewSettings,
 };
 
-use crate::gpu::{Session, session};
+use crate::gpu::{Session, session, session_within};
 use crate::shaders_under_test;
 
 /// A renderer, one view, and the device's attention for one test.
@@ -32,7 +32,7 @@ impl Studio {
     /// # Panics
     /// When the device cannot.
     pub fn with_window(extent: [u32; 2], settings: ViewSettings, window: bool) -> Self {
-        Self::make(extent, settings, window, AccelPolicy::default())
+        Self::make(session(), extent, settings, window, AccelPolicy::default())
     }
 
     /// A studio with this scene, whose acceleration structures follow a policy.
@@ -46,14 +46,27 @@ impl Studio {
         scene: &SceneDelta,
         camera: Camera,
     ) -> Self {
-        let mut studio = Self::make(extent, settings, false, policy);
+        let mut studio = Self::make(session(), extent, settings, false, policy);
         studio.view_mut().set_camera(camera);
         studio.apply(scene);
         studio
     }
 
-    fn make(extent: [u32; 2], settings: ViewSettings, window: bool, acceleration: AccelPolicy) -> Self {
-        let mut session = session();
+    /// A studio on a device that gives out no more memory than this.
+    ///
+    /// # Panics
+    /// When the device cannot.
+    pub fn within(memory_limit_bytes: u64, extent: [u32; 2], settings: ViewSettings) -> Self {
+        Self::make(session_within(memory_limit_bytes), extent, settings, false, AccelPolicy::default())
+    }
+
+    fn make(
+        mut session: Session,
+        extent: [u32; 2],
+        settings: ViewSettings,
+        window: bool,
+        acceleration: AccelPolicy,
+    ) -> Self {
         let options =
             RendererOptions { shaders: shaders_under_test(), acceleration, ..RendererOptions::default() };
         let mut renderer = Renderer::new(&session.device, &mut session.frames, &options).expect("a renderer");

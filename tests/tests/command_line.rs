@@ -174,6 +174,34 @@ fn read_exr(path: &Path) -> (Vec<[f32; 3]>, String) {
 }
 
 #[test]
+fn a_variant_of_materials_is_chosen_by_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut model: Value = serde_json::from_str(&cube(false)).expect("JSON");
+    let unlit = |rgba: [f32; 4]| serde_json::json!({"pbrMetallicRoughness": {"baseColorFactor": rgba}, "extensions": {"KHR_materials_unlit": {}}});
+    model["materials"] = serde_json::json!([unlit([1.0, 0.0, 0.0, 1.0]), unlit([0.0, 1.0, 0.0, 1.0])]);
+    model["extensions"] = serde_json::json!({"KHR_materials_variants": {"variants": [{"name": "green"}]}});
+    model["extensionsUsed"] = serde_json::json!(["KHR_materials_unlit", "KHR_materials_variants"]);
+    let primitive = &mut model["meshes"][0]["primitives"][0];
+    primitive["material"] = Value::from(0);
+    primitive["extensions"] =
+        serde_json::json!({"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [0]}]}});
+    std::fs::write(folder.path().join("cube.gltf"), model.to_string()).expect("a file");
+    let middle = |more: &[&str]| {
+        let run = render(folder.path(), "cube.gltf", &[&["-o", "a.png", "--samples", "2"], more].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        image::open(folder.path().join("a.png")).expect("the PNG").to_rgb8().get_pixel(32, 24).0
+    };
+    let ([red, ..], [_, green, _]) = (middle(&[]), middle(&["--variant", "green"]));
+    assert!(red > 200 && green > 200, "{red} {green}");
+    let run = render(folder.path(), "cube.gltf", &["-o", "a.png", "--variant", "blue"]);
+    assert!(
+        run.code == Some(1) && run.stderr.contains("no variant 'blue'; there is: green"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
 fn an_exr_holds_radiance_and_its_origin() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = render(folder.path(), &gallery(), &["-o", "a.exr", "--samples", "6", "--exposure", "3"]);

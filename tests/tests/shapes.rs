@@ -95,7 +95,7 @@ fn textures_lie_on_shapes_as_on_triangles() {
         let image = |left: Mesh, right: Mesh, right_at: Affine3A| {
             let mut scene = Scene::new();
             let mut paint = checker(2, 10, 250);
-            for (index, texel) in paint.rgba8.chunks_exact_mut(4).enumerate() {
+            for (index, texel) in std::sync::Arc::make_mut(&mut paint.rgba8).chunks_exact_mut(4).enumerate() {
                 texel[1] = (index % 16 * 15) as u8;
                 texel[2] = (index / 16 * 15) as u8;
             }

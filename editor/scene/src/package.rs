@@ -144,24 +144,30 @@ impl Document {
     }
 
     /// The edit that puts a new reading of the source in a prefab's place. Assets keep their ids by their
-    /// place in the file; materials that were edited stay as they were edited, primitives that were moved stay moved.
+    /// place in the file; materials that were edited stay as they were edited, primitives that were moved stay moved. Of
+    /// another file, that holds for materials of the same name and meshes with as many primitives.
     ///
     /// # Errors
     /// When the prefab is not in the document.
     pub fn reload_edit(&mut self, id: PrefabId, imported: Imported) -> Result<Edit, EditError> {
         let old = self.prefab(id).ok_or_else(|| EditError::NoAsset(format!("prefab {}", id.0)))?;
+        let same_file = old.source == imported.prefab.source;
         let (meshes, materials, textures) = (old.meshes.clone(), old.materials.clone(), old.textures.clone());
         let ids = (&meshes[..], &materials[..], &textures[..]);
         let mut package = package_with_ids(self, id, imported, ids);
         for (material, entry) in &mut package.materials {
             if let Some(now) = self.material_entry(*material)
                 && now.original.as_ref() != Some(&now.value)
+                && (same_file || now.original.as_ref().is_some_and(|before| before.name == entry.value.name))
             {
                 entry.value = now.value.clone();
             }
         }
         for (id, mesh) in &mut package.meshes {
             let old = self.mesh(*id).map_or(&[][..], |old| &old.primitives);
+            if !same_file && old.len() != mesh.primitives.len() {
+                continue;
+            }
             for (primitive, old) in mesh.primitives.iter_mut().zip(old) {
                 primitive.mesh_from_primitive = old.mesh_from_primitive;
             }

@@ -67,6 +67,14 @@ pub enum Action {
     Rename,
     /// Show or hide what is selected.
     ToggleVisible,
+    /// Keep what is selected from being changed, or let go of it.
+    ToggleLock,
+    /// Give the active instance a prefab of its own.
+    MakeUnique,
+    /// Read the source of a prefab again.
+    ReloadSource(PrefabId),
+    /// Ask for another source of a prefab.
+    ReplaceSource(PrefabId),
     /// Select every object at the top.
     SelectAll,
     /// Select nothing.
@@ -196,7 +204,7 @@ fn file() -> Vec<Command> {
     vec![
         file(icon::FILE_PLUS, "New scene", Action::New, Some((CTRL, Key::N))),
         file(icon::FOLDER_OPEN, "Open\u{2026}", Action::Open, Some((CTRL, Key::O))),
-        file(icon::DOWNLOAD_SIMPLE, "Import model\u{2026}", Action::Import, Some((CTRL, Key::I))),
+        file(icon::DOWNLOAD_SIMPLE, "Import\u{2026}", Action::Import, Some((CTRL, Key::I))),
         file(icon::FLOPPY_DISK, "Save", Action::Save, Some((CTRL, Key::S))),
         file(icon::FLOPPY_DISK_BACK, "Save as\u{2026}", Action::SaveAs, Some((CTRL_SHIFT, Key::S))),
         file(icon::EXPORT, "Export\u{2026}", Action::Export, Some((CTRL, Key::E))),
@@ -213,7 +221,9 @@ fn edit() -> Vec<Command> {
         edit(icon::TRASH, "Delete", Action::Delete, Some((PLAIN, Key::Delete))),
         edit(icon::PENCIL_SIMPLE, "Rename", Action::Rename, Some((PLAIN, Key::F2))),
         edit(icon::EYE, "Show or hide", Action::ToggleVisible, Some((PLAIN, Key::H))),
+        edit(icon::LOCK_SIMPLE, "Lock or unlock", Action::ToggleLock, Some((CTRL, Key::L))),
         edit(icon::FOLDER_SIMPLE_PLUS, "Group", Action::Group, Some((CTRL, Key::G))),
+        edit(icon::PACKAGE, "Make instance unique", Action::MakeUnique, None),
         edit(icon::SELECTION_ALL, "Select all", Action::SelectAll, Some((CTRL, Key::A))),
         edit(icon::SELECTION, "Select nothing", Action::SelectNone, Some((CTRL_SHIFT, Key::A))),
     ]

@@ -1,5 +1,7 @@
 //! Carries out actions. Enters: an action. Leaves: edits pushed to the session, a moved camera, changed memory.
 
+use std::collections::BTreeSet;
+
 use caustica_scene::{
     Camera, Cloud, Edit, Environment, Light, LightKind, Local, Node, NodeId, NodeKind, PrefabId, Projection,
     ShapeSource, Target, Trs,
@@ -36,6 +38,10 @@ impl Editor {
             Action::Delete => self.delete(),
             Action::Rename => self.rename(),
             Action::ToggleVisible => self.toggle_visible(),
+            Action::ToggleLock => self.toggle_lock(),
+            Action::MakeUnique => self.make_unique(),
+            Action::ReloadSource(prefab) => self.reload_source(prefab),
+            Action::ReplaceSource(prefab) => self.ask(Wish::Source(prefab)),
             Action::SelectAll => {
                 let roots: Vec<Target> =
                     self.session.document().roots().iter().copied().map(Target::node).collect();
@@ -201,6 +207,24 @@ impl Editor {
         let edits = targets.iter().map(|&target| Edit::SetVisible { target, visible }).collect();
         let label = format!("{} {} objects", if visible { "showed" } else { "hid" }, targets.len());
         self.push_batch(label, edits);
+    }
+
+    fn toggle_lock(&mut self) {
+        let document = self.session.document();
+        let nodes: BTreeSet<NodeId> =
+            self.state.selection.targets().iter().map(|target| target.node).collect();
+        let is_locked = |node: &NodeId| document.node(*node).is_some_and(|node| node.locked);
+        // One that is free locks all.
+        let locked = !nodes.iter().all(is_locked);
+        let label = format!("{} {} objects", if locked { "locked" } else { "unlocked" }, nodes.len());
+        self.push_batch(label, nodes.into_iter().map(|node| Edit::SetLocked { node, locked }).collect());
+    }
+
+    fn make_unique(&mut self) {
+        let Some(active) = self.state.selection.active() else { return };
+        if let Err(error) = self.session.make_unique(active.node) {
+            self.state.toasts.error(format!("That cannot be made unique: {error}."));
+        }
     }
 
     fn group(&mut self) {

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use caustica_scene::PrefabId;
+
 use super::editor::{Editor, Then};
 use crate::dialogs::{
     ENVIRONMENT_ENDINGS, EXPORT_ENDINGS, MODEL_ENDINGS, PROJECT_ENDING, SHAPE_ENDINGS, Wish,
@@ -16,6 +18,8 @@ pub(super) enum Purpose {
     Open,
     /// As a part of the scene.
     Import,
+    /// In the place of a prefab's source.
+    Source(PrefabId),
 }
 
 /// A file that is being read.
@@ -71,6 +75,7 @@ impl Editor {
         match wish {
             Wish::Open => self.load(Purpose::Open, path),
             Wish::Import | Wish::Environment => self.load(Purpose::Import, path),
+            Wish::Source(prefab) => self.load(Purpose::Source(prefab), path),
             Wish::SaveAs => self.save_to(&path),
             Wish::Export => self.export_to(path),
         }
@@ -102,6 +107,7 @@ impl Editor {
         let label = match purpose {
             Purpose::Open => format!("Opening {name}"),
             Purpose::Import => format!("Importing {name}"),
+            Purpose::Source(_) => format!("Reading {name}"),
         };
         let file = path.clone();
         match Job::start(label, self.wake.clone(), move |progress| session::load(&file, progress)) {
@@ -129,6 +135,7 @@ impl Editor {
             Answer::Done(Err(error)) => self.state.toasts.error(format!("{error:#}")),
             Answer::Done(Ok(loaded)) => {
                 let result = match (loading.purpose, &loaded) {
+                    (Purpose::Source(prefab), _) => self.replace_source(prefab, &loading.path, loaded),
                     (_, Loaded::Environment(..)) | (Purpose::Import, _) => self.import(&loading.path, loaded),
                     (Purpose::Open, _) => self.open(&loading.path, loaded),
                 };
@@ -151,7 +158,7 @@ impl Editor {
     fn import(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
         let warnings = warning_count(&loaded);
         let was_empty = self.session.document().node_count() == 0;
-        let node = self.session.import(loaded)?;
+        let node = self.session.import(path, loaded)?;
         self.session.end_gesture();
         if let Some(node) = node {
             self.state.selection.set(node.into());
@@ -162,6 +169,21 @@ impl Editor {
         }
         self.tell(format!("Imported {}", short(path)), warnings);
         Ok(())
+    }
+
+    fn replace_source(&mut self, prefab: PrefabId, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
+        let warnings = warning_count(&loaded);
+        self.session.replace_source(prefab, loaded)?;
+        self.session.end_gesture();
+        self.tell(format!("The source is {} now", short(path)), warnings);
+        Ok(())
+    }
+
+    /// Reads the source of a prefab again.
+    pub(super) fn reload_source(&mut self, prefab: PrefabId) {
+        if let Some(source) = self.session.document().prefab(prefab).map(|prefab| prefab.source.clone()) {
+            self.load(Purpose::Source(prefab), source);
+        }
     }
 
     pub(super) fn tell(&mut self, done: String, warnings: usize) {

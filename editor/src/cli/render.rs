@@ -2,6 +2,7 @@
 
 mod args;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -66,6 +67,9 @@ pub(super) fn run(
     if let Some(environment) = environment {
         session.push(Edit::SetEnvironment(environment))?;
     }
+    if let Some(name) = &args.variant {
+        choose_variant(&mut session, name).with_context(|| args.file.display().to_string())?;
+    }
     if let Some(name) = &args.camera {
         let known: Vec<String> =
             session.document().cameras().map(|c| session.document().display_name(c.target)).collect();
@@ -127,6 +131,23 @@ pub(super) fn run(
     Ok(ExitCode::SUCCESS)
 }
 
+/// Shows all instances that have a variant of materials of this name in it.
+fn choose_variant(session: &mut Session, name: &str) -> anyhow::Result<()> {
+    let document = session.document();
+    let variants: BTreeMap<_, _> = document.prefabs().map(|(id, prefab)| (id, prefab.variants())).collect();
+    let has_it = |prefab| variants.get(&prefab).is_some_and(|known| known.iter().any(|known| known == name));
+    let instances = document.nodes().filter(|(_, node)| node.prefab().is_some_and(has_it));
+    let choose = |node| Edit::SetVariant { node, variant: Some(name.to_owned()) };
+    let edits: Vec<Edit> = instances.map(|(id, _)| choose(id)).collect();
+    if edits.is_empty() {
+        let known: BTreeSet<String> = variants.into_values().flatten().collect();
+        let known: Vec<String> = known.into_iter().collect();
+        let known = if known.is_empty() { String::from("the scene has none") } else { known.join(", ") };
+        bail!("no variant '{name}'; there is: {known}");
+    }
+    Ok(session.push(Edit::batch("chose a variant", edits))?)
+}
+
 /// Messages of the validation layer are an error of ours: they are never silent.
 pub(super) fn report_validation(device: &caustica_renderer::gpu::Device) -> anyhow::Result<()> {
     let messages = device.instance().take_messages();
@@ -162,7 +183,7 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     let mut frames = Vec::new();
     let in_time = |samples: u64| samples == 0 || limit.is_none_or(|limit| start.elapsed() < limit);
     let mut done = 0;
-    while done < samples && in_time(done) {
+    while (done < samples || session.textures_settle()) && in_time(done) {
         let recorder = session.begin_frame(args.size)?;
         session.submit(recorder, None)?;
         let times = &session.statistics().passes;

@@ -1,9 +1,7 @@
 //! The selected object: name, transform, materials, light, camera. Enters: the document. Leaves: edits; a drag of a
 //! field is one step of the history because its edits join.
 
-use caustica_scene::{
-    Camera, Driven, Edit, Light, LightKind, Local, NodeKind, OverrideField, Projection, Target, Trs,
-};
+use caustica_scene::{Camera, Driven, Edit, Light, LightKind, Local, NodeId, Projection, Target, Trs};
 use egui::{DragValue, RichText, TextEdit, Ui};
 use egui_phosphor::regular as icon;
 use glam::DVec3;
@@ -21,6 +19,26 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         return;
     };
     header(cx, ui, target);
+    let lock = cx.session.document().locked_by(target);
+    if let Some(node) = lock {
+        locked_note(cx, ui, node);
+    }
+    ui.add_enabled_ui(lock.is_none(), |ui| sections(cx, ui, target));
+}
+
+/// Tells why nothing can be changed, and lets go.
+fn locked_note(cx: &mut Cx<'_>, ui: &mut Ui, node: NodeId) {
+    ui.horizontal(|ui| {
+        let name = cx.session.document().display_name(node.into());
+        ui.label(format!("{}  {name} is locked.", icon::LOCK_SIMPLE));
+        if ui.button("Unlock").clicked() {
+            cx.push(Edit::SetLocked { node, locked: false });
+        }
+    });
+    ui.add_space(6.0);
+}
+
+fn sections(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     section(ui, "Transform", |ui| transform(cx, ui, target));
     if let Some(light) = cx.session.document().light_of(target) {
         section(ui, "Light", |ui| light_ui(cx, ui, target, light));
@@ -33,7 +51,7 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         super::mesh::ui(cx, ui, target);
         super::material::ui(cx, ui, target);
     }
-    source(cx, ui, target);
+    super::source::ui(cx, ui, target);
 }
 
 fn header(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
@@ -391,32 +409,6 @@ fn camera_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Camera) {
         let tip = "The command line and the 0 key use this camera when none is named";
         if ui.add(button).on_hover_text(tip).clicked() && !chosen {
             cx.push(Edit::SetDefaultCamera(Some(target)));
-        }
-    });
-}
-
-fn source(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
-    let document = cx.session.document();
-    let Some(node) = document.node(target.node) else { return };
-    let NodeKind::Prefab { prefab, .. } = &node.kind else { return };
-    let Some(prefab) = document.prefab(*prefab) else { return };
-    // Inside the project's folder, the path from there is enough.
-    let folder = cx.session.path().and_then(std::path::Path::parent);
-    let shown = folder.and_then(|folder| prefab.source.strip_prefix(folder).ok()).unwrap_or(&prefab.source);
-    let (source, missing) = (shown.display().to_string(), prefab.missing);
-    let changed = document.part_override(target).is_some();
-    section(ui, "Source", |ui| {
-        ui.label(RichText::new(&source).small()).on_hover_text("The file that this instance shows");
-        if missing {
-            ui.colored_label(
-                ui.visuals().error_fg_color,
-                "The file was not found: nothing is shown in its place.",
-            );
-        }
-        if target.part.is_some()
-            && ui.add_enabled(changed, egui::Button::new("Follow the source again")).clicked()
-        {
-            cx.push(Edit::ResetOverride { target, field: OverrideField::All });
         }
     });
 }

@@ -14,6 +14,11 @@ use crate::ui_state::Row;
 
 const INDENT: f32 = 16.0;
 
+/// How far the name of a row stands from the left: deep down in a tree it stays in the panel.
+fn indent(row: Row, rect: Rect) -> f32 {
+    (f32::from(row.depth) * INDENT).min((rect.width() * 0.5).max(0.0))
+}
+
 /// Draws the panel.
 pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
     search_box(cx, ui);
@@ -80,10 +85,12 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: Row, index: usize) {
     let response = ui.interact(rect, id, Sense::click_and_drag());
     let eye_rect = Rect::from_min_max(Pos2::new(rect.right() - ROW, rect.top()), rect.max);
     let eye = ui.interact(eye_rect, id.with("eye"), Sense::click());
-    let indent = f32::from(row.depth) * INDENT;
-    let caret_rect = Rect::from_min_size(rect.min + vec2(indent, 0.0), vec2(INDENT + 4.0, ROW));
+    let lock_rect = eye_rect.translate(vec2(-ROW, 0.0));
+    let lock = target.part.is_none().then(|| ui.interact(lock_rect, id.with("lock"), Sense::click()));
+    let caret_rect = Rect::from_min_size(rect.min + vec2(indent(row, rect), 0.0), vec2(INDENT + 4.0, ROW));
     let caret = row.has_children.then(|| ui.interact(caret_rect, id.with("caret"), Sense::click()));
-    paint_row(cx, ui, row, rect, &response, &eye);
+    let hovered = response.hovered() || eye.hovered() || lock.as_ref().is_some_and(Response::hovered);
+    paint_row(cx, ui, row, rect, &response, hovered);
 
     if caret.is_some_and(|caret| caret.clicked()) {
         let open = !cx.state.outliner.is_open(target);
@@ -91,6 +98,11 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: Row, index: usize) {
     } else if eye.on_hover_text("Show or hide this and everything below it").clicked() {
         let visible = !cx.session.document().visible(target).unwrap_or(true);
         cx.push(Edit::SetVisible { target, visible });
+    } else if lock
+        .is_some_and(|lock| lock.on_hover_text("Lock or unlock this and everything below it").clicked())
+    {
+        let locked = !cx.session.document().node(target.node).is_some_and(|node| node.locked);
+        cx.push(Edit::SetLocked { node: target.node, locked });
     } else if response.double_clicked() {
         start_renaming(cx, target);
     } else if response.clicked() {
@@ -100,11 +112,10 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: Row, index: usize) {
     response.context_menu(|ui| context_menu(cx, ui, target));
 }
 
-fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, eye: &Response) {
+fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, hovered: bool) {
     let document = cx.session.document();
     let (painter, visuals) = (ui.painter(), ui.visuals());
     let selected = cx.state.selection.contains(row.target);
-    let hovered = response.hovered() || eye.hovered();
     if selected || hovered {
         let fill = if selected {
             visuals.selection.bg_fill
@@ -121,7 +132,7 @@ fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, ey
         (_, false) => visuals.weak_text_color().gamma_multiply(0.7),
     };
     let middle = rect.center().y;
-    let mut x = rect.left() + f32::from(row.depth) * INDENT + 3.0;
+    let mut x = rect.left() + indent(row, rect) + 3.0;
     let font = FontId::proportional(13.5);
     let put = |x: f32, text: &str, color: Color32| {
         painter.text(Pos2::new(x, middle), Align2::LEFT_CENTER, text, font.clone(), color);
@@ -135,7 +146,9 @@ fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, ey
     put(x, target_icon(cx, row.target), if selected { color } else { visuals.weak_text_color() });
     x += 20.0;
     let broken = document.world_from(row.target).is_some_and(|world| is_degenerate(&world));
-    let right = rect.right() - ROW - if broken { 20.0 } else { 0.0 };
+    let locked = document.node(row.target.node).is_some_and(|node| node.locked) && row.target.part.is_none();
+    let buttons = if locked || hovered { 2.0 * ROW } else { ROW };
+    let right = rect.right() - buttons - if broken { 20.0 } else { 0.0 };
     let name_rect = Rect::from_min_max(Pos2::new(x, rect.top()), Pos2::new(right.max(x), rect.bottom()));
     let job =
         egui::text::LayoutJob::simple_singleline(document.display_name(row.target), font.clone(), color);
@@ -156,6 +169,13 @@ fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, ey
             visuals.weak_text_color(),
         );
     }
+    if locked || (hovered && row.target.part.is_none()) {
+        put(
+            rect.right() - 2.0 * ROW + 5.0,
+            if locked { icon::LOCK_SIMPLE } else { icon::LOCK_SIMPLE_OPEN },
+            visuals.weak_text_color(),
+        );
+    }
     if broken && response.hovered() {
         response.show_tooltip_text(
             "Left out of the picture: its scale is zero, or its place is no finite number",
@@ -164,7 +184,7 @@ fn paint_row(cx: &Cx<'_>, ui: &Ui, row: Row, rect: Rect, response: &Response, ey
 }
 
 fn rename_ui(cx: &mut Cx<'_>, ui: &mut Ui, rect: Rect, row: Row) {
-    let left = rect.left() + f32::from(row.depth) * INDENT + INDENT + 18.0;
+    let left = rect.left() + indent(row, rect) + INDENT + 18.0;
     let field = Rect::from_min_max(
         Pos2::new(left, rect.top() + 1.0),
         Pos2::new(rect.right() - 4.0, rect.bottom() - 1.0),
@@ -286,6 +306,7 @@ fn context_menu(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
         (icon::CROSSHAIR, "Frame", Action::FrameSelection, true),
         (icon::PENCIL_SIMPLE, "Rename", Action::Rename, true),
         (icon::EYE, "Show or hide", Action::ToggleVisible, true),
+        (icon::LOCK_SIMPLE, "Lock or unlock", Action::ToggleLock, node),
         (icon::COPY, "Duplicate", Action::Duplicate, node),
         (icon::FOLDER_SIMPLE_PLUS, "Group", Action::Group, node),
         (icon::TRASH, "Delete", Action::Delete, node),

@@ -81,6 +81,9 @@ fn gizmo_frame(cx: &Cx<'_>, view: &ViewProjection) -> Option<Frame> {
         return Some(Frame::new(start.origin + moved, start.axes, view));
     }
     let document = cx.session.document();
+    if cx.state.selection.targets().iter().any(|target| document.locked_by(*target).is_some()) {
+        return None;
+    }
     let primitive = cx.state.selection.primitive(document);
     let world_from_primitive = primitive.and_then(|primitive| {
         let world = document.world_from_mesh(primitive.target)? * primitive.mesh_from_primitive;

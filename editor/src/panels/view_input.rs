@@ -232,6 +232,8 @@ pub fn click(cx: &mut Cx<'_>, ui: &Ui, response: &Response, mark: Option<Target>
             }
         },
     };
+    // What is locked is background, as in other editors; the outliner selects it.
+    let target = target.filter(|target| cx.session.document().locked_by(*target).is_none());
     let further = modifiers.command || modifiers.shift;
     match target {
         Some(target) if further => cx.state.selection.toggle(target),

@@ -86,7 +86,7 @@ pub(super) fn open(path: &Path, loaded: Loaded) -> anyhow::Result<Opened> {
         }
         other => {
             let mut document = Document::new();
-            let brought = import(&mut document, other)?;
+            let brought = import(&mut document, path, other)?;
             document.apply(brought.edit)?;
             Ok(Opened { document, meta: ProjectMeta::default(), path: None, camera: None, settings: None })
         }
@@ -104,10 +104,15 @@ pub(super) struct Brought {
     pub(super) node: Option<NodeId>,
 }
 
-/// Makes the edit that brings a model or an environment into a document.
-pub(super) fn import(document: &mut Document, loaded: Loaded) -> anyhow::Result<Brought> {
+/// Makes the edit that brings a project, a model or an environment into a document.
+pub(super) fn import(document: &mut Document, path: &Path, loaded: Loaded) -> anyhow::Result<Brought> {
     match loaded {
-        Loaded::Project(_) => bail!("a project can be opened, not imported"),
+        Loaded::Project(project) => {
+            let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+            let (name, _) = name.split_once('.').unwrap_or((&name, ""));
+            let (node, edit) = document.merge_edit(&project.document, name)?;
+            Ok(Brought { edit, node: Some(node) })
+        }
         Loaded::Model(imported) => {
             let name = imported.prefab.name.clone();
             let (prefab, add) = document.import_edit(*imported);

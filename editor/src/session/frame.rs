@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use caustica_renderer::Statistics;
 use caustica_renderer::gpu::{Acquired, Image, Recorder};
+use caustica_renderer::{RendererError, Statistics};
 use caustica_scene::{Document, NodeId, Target};
 
 use super::{HostTimes, Lap, Pick, Session, Tally};
@@ -31,7 +31,23 @@ impl Session {
     pub fn begin_frame_at(
         &mut self,
         extent_px: [u32; 2],
-        divisor: impl FnOnce(bool) -> Option<u32>,
+        mut divisor: impl FnMut(bool) -> Option<u32>,
+    ) -> anyhow::Result<Recorder> {
+        loop {
+            match self.try_frame(extent_px, &mut divisor) {
+                // What the scene needs comes before the detail of its textures.
+                Err(error) if is_out_of_memory(&error) && self.renderer.give_up_textures() => {
+                    self.resync = true
+                }
+                tried => return tried,
+            }
+        }
+    }
+
+    fn try_frame(
+        &mut self,
+        extent_px: [u32; 2],
+        divisor: &mut dyn FnMut(bool) -> Option<u32>,
     ) -> anyhow::Result<Recorder> {
         if std::mem::take(&mut self.resync) {
             self.send_all_again()?;
@@ -66,7 +82,7 @@ impl Session {
         &mut self,
         recorder: &mut Recorder,
         extent_px: [u32; 2],
-        divisor: impl FnOnce(bool) -> Option<u32>,
+        divisor: &mut dyn FnMut(bool) -> Option<u32>,
     ) -> anyhow::Result<()> {
         let mut lap = Lap::start();
         let eye = self.camera.world_from_camera.translation;
@@ -151,9 +167,14 @@ impl Session {
         self.samples() >= CONVERGED_SAMPLES
     }
 
-    /// Whether nothing is left to do: no sample, and no structure that is still built or made better.
+    /// Whether nothing is left to do: no sample, no structure that is still built or made better, no texture that waits.
     pub fn is_done(&self) -> bool {
-        self.is_converged() && !self.renderer.is_busy()
+        self.is_converged() && !self.renderer.is_busy() && !self.textures_settle()
+    }
+
+    /// Whether it is still open how much of the textures fits; when it is known, samples begin anew.
+    pub fn textures_settle(&self) -> bool {
+        self.renderer.textures_settle()
     }
 
     /// Whether acceleration structures are left to later frames.
@@ -211,6 +232,10 @@ impl Session {
     pub fn read_display(&mut self) -> anyhow::Result<Vec<[f32; 4]>> {
         Ok(self.renderer.read_display(&mut self.frames, self.view)?)
     }
+}
+
+fn is_out_of_memory(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<RendererError>().is_some_and(RendererError::is_out_of_memory)
 }
 
 /// A sum of nothing is no time, and in Rust it is -0.

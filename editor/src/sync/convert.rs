@@ -92,7 +92,7 @@ pub fn texture_of(texture: &scene::Texture) -> delta::Texture {
         name: texture.name.clone(),
         width: texture.width,
         height: texture.height,
-        rgba8: texture.rgba8.to_vec(),
+        rgba8: Arc::clone(&texture.rgba8),
         srgb: texture.srgb,
         sampler: delta::Sampler {
             wrap_u: wrap(sampler.wrap_u),

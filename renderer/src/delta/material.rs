@@ -1,5 +1,7 @@
 //! Materials and the textures that they use.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3, Vec4};
 
 use super::{Lobes, TextureId};
@@ -56,7 +58,7 @@ pub struct Texture {
     /// Height in texels, at least 1.
     pub height: u32,
     /// `width * height * 4` bytes.
-    pub rgba8: Vec<u8>,
+    pub rgba8: Arc<[u8]>,
     /// True: colours are sRGB encoded (base colour, emissive). False: data.
     pub srgb: bool,
     /// How it is sampled.

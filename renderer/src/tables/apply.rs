@@ -99,11 +99,12 @@ impl Tables {
         others: &mut Others,
     ) -> Result<()> {
         for (id, texture) in &delta.textures {
-            self.textures.set(recorder, *id, texture)?;
+            self.textures.set(*id, texture)?;
         }
         for id in &delta.removed_textures {
             self.textures.remove(*id);
         }
+        self.textures.fit_new(recorder)?;
         for (id, material) in &delta.materials {
             match self.materials.set(*id, material, &self.textures) {
                 MaterialChange::Values => {}

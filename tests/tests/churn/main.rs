@@ -102,7 +102,7 @@ fn sky(folder: &Path) -> Environment {
 
 /// An instance of the model on a floor below a lamp.
 fn furnish(session: &mut Session, model: &Path) {
-    session.import(load(model, &|_, _| {}).expect("the model")).expect("an instance");
+    session.import(model, load(model, &|_, _| {}).expect("the model")).expect("an instance");
     let camera = ViewCamera::looking_at(DVec3::new(0.4, 1.6, 5.0), DVec3::new(0.0, 0.8, 0.0), 0.7, 0.01);
     session.set_camera(camera);
     let plate = session.document().meshes().find(|(_, mesh)| mesh.name == "Plate").expect("the plate").0;

@@ -1,7 +1,7 @@
 //! Variants of materials (KHR_materials_variants): chosen for an instance, kept by name.
 
-use crate::common::{PLATE, Scene, model, scene};
-use caustica_scene::import::Imported;
+use crate::common::{PLATE, Scene, scene};
+use caustica_scene::import::{ImportOptions, Imported, load};
 use caustica_scene::{Edit, EditError, MaterialId, Target, audit};
 
 fn materials(scene: &Scene, target: Target) -> Vec<MaterialId> {
@@ -43,15 +43,10 @@ fn a_variant_that_the_source_has_lost_is_kept_and_told_of() {
         let edit = scene.document.reload_edit(scene.prefab, imported).unwrap();
         scene.document.apply(edit).unwrap()
     };
-    let mut without = model(folder.path());
     let path = folder.path().join("other.gltf");
     let text = std::fs::read_to_string(folder.path().join("model.gltf")).unwrap();
     std::fs::write(&path, text.replace("glowing", "dull")).unwrap();
-    std::mem::swap(
-        &mut without,
-        &mut caustica_scene::import::load(&path, &caustica_scene::import::ImportOptions::default()).unwrap(),
-    );
-    let undo = reload(&mut scene, without);
+    let undo = reload(&mut scene, load(&path, &ImportOptions::default()).unwrap());
     let own = scene.document.mesh(scene.document.mesh_of(scene.part(PLATE)).unwrap()).unwrap();
     let own: Vec<MaterialId> = own.primitives.iter().map(|primitive| primitive.material).collect();
     assert_eq!(materials(&scene, scene.part(PLATE)), own);

@@ -40,6 +40,9 @@ pub(in crate::cli) struct RenderArgs {
     /// Name of the camera
     #[arg(long)]
     pub(super) camera: Option<String>,
+    /// Show every instance that has it in this variant of materials (KHR_materials_variants)
+    #[arg(long, value_name = "NAME")]
+    pub(super) variant: Option<String>,
     /// An environment map (.hdr, .exr), or a constant radiance R,G,B
     #[arg(long, value_name = "FILE|R,G,B")]
     pub(super) environment: Option<String>,

@@ -1,9 +1,11 @@
-//! Textures that do not fit: what is seen least goes without its largest levels, and they come back.
+//! What is in device memory: a prefab that is placed again takes none, and of textures that do not fit those that are seen
+//! least go without their largest levels.
 #![expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 
 use std::fmt::Write as _;
 use std::path::Path;
 
+use caustica::session::{Session, SessionOptions, load};
 use caustica_gpu::MemoryUse;
 use caustica_renderer::delta::{Camera, InstanceId, Material, SceneDelta, Texture, TextureId};
 use caustica_renderer::{Pipeline, ViewSettings};
@@ -116,6 +118,42 @@ fn what_is_seen_least_goes_without_levels_and_they_come_back() {
     settle(&mut studio);
     let two = textures_mib(&studio);
     assert!((two - 2.0 * whole / COUNT as f64).abs() < 0.5, "the two that are left are whole: {two}");
+}
+
+/// Bytes of geometry, textures and acceleration structures once everything has come to rest.
+fn bytes_of(session: &mut Session) -> [u64; 3] {
+    for _ in 0..8 {
+        let recorder = session.begin_frame([32, 32]).expect("a frame");
+        session.submit(recorder, None).expect("a submission");
+    }
+    let memory = session.device().memory_by_use();
+    let bytes = |wanted| memory.iter().find(|(kind, _)| *kind == wanted).map_or(0, |(_, bytes)| *bytes);
+    [MemoryUse::Geometry, MemoryUse::Textures, MemoryUse::AccelerationStructures].map(bytes)
+}
+
+#[test]
+fn a_prefab_placed_again_takes_no_memory_and_a_unique_one_its_own() {
+    let gpu = caustica_tests::gpu::session();
+    let settings = ViewSettings { pipeline: Pipeline::Raytraced, ..ViewSettings::default() };
+    let options = SessionOptions { settings, extent: [32, 32], ..SessionOptions::default() };
+    let mut session = Session::new(&gpu.device, options).expect("a session");
+    let path = caustica_tests::repository().join("projects/gallery/gallery.caustica.json");
+    session.open(&path, load(&path, &|_, _| {}).expect("the gallery")).expect("a scene");
+    let vase = session.document().nodes().find(|(_, node)| node.name == "Painted vase").expect("the vase").0;
+    let before = bytes_of(&mut session);
+    for _ in 0..50 {
+        session.edit_with(|document| document.duplicate_edit(vase).expect("a copy")).expect("an edit");
+    }
+    let placed = bytes_of(&mut session);
+    println!("[geometry, textures, structures]: {before:?}, with 50 more vases {placed:?}");
+    assert_eq!(placed[..2], before[..2]);
+    assert!(placed[2] - before[2] < 64 << 10, "the top level alone holds 50 more references");
+    session.make_unique(vase).expect("a copy of the prefab");
+    let unique = bytes_of(&mut session);
+    println!("and one of them unique {unique:?}");
+    assert!(unique[0] > placed[0] && unique[2] > placed[2]);
+    session.undo();
+    assert_eq!(bytes_of(&mut session)[..2], before[..2], "what is gone takes nothing");
 }
 
 /// 16 textures of 16 MiB each.

@@ -63,7 +63,7 @@ pub struct ChangeSet {
     pub environment: bool,
     /// Names, order, parents or the default camera changed: lists on the screen are stale.
     pub structure: bool,
-    /// What happened, in words such as "moved Chair", without repeats, in order.
+    /// What happened, in words such as "moved Chair", in order; the same one after the other counts once.
     pub reasons: Vec<String>,
 }
 
@@ -98,7 +98,7 @@ impl ChangeSet {
     }
 
     pub(crate) fn add_reason(&mut self, reason: String) {
-        if !reason.is_empty() && !self.reasons.contains(&reason) {
+        if !reason.is_empty() && self.reasons.last() != Some(&reason) {
             self.reasons.push(reason);
         }
     }

@@ -190,7 +190,7 @@ impl Editor {
     fn delete(&mut self) {
         let nodes = self.selected_nodes();
         let label = format!("removed {} objects", nodes.len());
-        self.push_batch(label, nodes.into_iter().map(|node| Edit::RemoveNode { node }).collect());
+        self.push_batch(label, nodes.into_iter().rev().map(|node| Edit::RemoveNode { node }).collect());
     }
 
     fn rename(&mut self) {

@@ -52,8 +52,7 @@ impl Document {
     pub(super) fn remove_node(&mut self, top: NodeId) -> Result<Edit, EditError> {
         let parent = self.node(top).map(|node| node.parent).ok_or(EditError::NoNode(top))?;
         let siblings = self.siblings_mut(parent)?;
-        let index = siblings.iter().position(|&id| id == top).unwrap_or(0);
-        siblings.retain(|&id| id != top);
+        let index = take_out(siblings, top);
         let mut subtree = Subtree::default();
         for id in self.subtree_ids(top) {
             self.report_removed(id);
@@ -87,8 +86,7 @@ impl Document {
         let old_parent = std::mem::replace(&mut moved.parent, parent);
         let old_local = std::mem::replace(&mut moved.local, local);
         let siblings = self.siblings_mut(old_parent)?;
-        let old_index = siblings.iter().position(|&id| id == node).unwrap_or(0);
-        siblings.retain(|&id| id != node);
+        let old_index = take_out(siblings, node);
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), node);
         // Dirty again from here even if it was: what is above it is another now.
@@ -235,4 +233,13 @@ impl Document {
             pose: self.pose_of(node),
         }
     }
+}
+
+/// Takes a node out of the list of its siblings and returns where it was. Searched from the end: who removes many begins there.
+fn take_out(siblings: &mut Vec<NodeId>, node: NodeId) -> usize {
+    let index = siblings.iter().rposition(|&id| id == node);
+    if let Some(index) = index {
+        siblings.remove(index);
+    }
+    index.unwrap_or(0)
 }

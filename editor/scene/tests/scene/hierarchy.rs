@@ -63,6 +63,41 @@ fn moving_a_node_costs_its_subtree() {
         });
         println!("| {size} | {time:.1?} | {:.0?} |", time / size as u32);
     }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wide.caustica.json");
+    let (saved, ()) = timed(|| Project::save(&path, &document, &ProjectMeta::default()).unwrap());
+    let (read, project) = timed(|| Project::load(&path).unwrap());
+    assert!(project.document == document);
+    println!("all saved in {saved:.1?}, read in {read:.1?}");
+}
+
+#[test]
+fn a_hundred_thousand_nodes_side_by_side_are_handled_at_once() {
+    let (mut document, ids) = tree(NODES, NODES);
+    let (before, top) = (document.clone(), ids[0]);
+    println!("| {NODES} siblings | time |\n|---|---|");
+    let remove = ids[1..NODES].iter().rev().map(|&node| Edit::RemoveNode { node }).collect();
+    let (removed, undo) = timed(|| document.apply(Edit::batch("removed all", remove)).unwrap());
+    assert_eq!(document.node_count(), 2);
+    let (restored, _) = timed(|| document.apply(undo).unwrap());
+    assert!(document == before);
+    let (copied, _) = timed(|| {
+        let (_, edit) = document.duplicate_edit(top).unwrap();
+        document.apply(edit).unwrap()
+    });
+    let hide =
+        ids[1..NODES].iter().map(|&node| Edit::SetVisible { target: node.into(), visible: false }).collect();
+    let (hidden, _) = timed(|| document.apply(Edit::batch("hid all", hide)).unwrap());
+    let (updated, _) = timed(|| document.drain_changes());
+    for (name, time) in [
+        ("remove them one by one", removed),
+        ("undo that", restored),
+        ("copy their parent", copied),
+        ("hide them one by one", hidden),
+        ("bring the rest up to date", updated),
+    ] {
+        println!("| {name} | {time:.1?} |");
+    }
 }
 
 #[test]

@@ -7,11 +7,13 @@ use std::path::Path;
 use crate::assets::{Material, Mesh, Texture};
 use crate::prefab::Prefab;
 
+mod basis;
 mod environment;
 mod error;
 pub(crate) mod geometry;
 pub(crate) mod gltf;
 mod image;
+mod meshopt;
 mod obj;
 mod shapes;
 pub(crate) mod tangents;

@@ -16,6 +16,7 @@ mod animation;
 mod attributes;
 pub(super) mod buffers;
 mod check;
+mod compressed;
 mod container;
 mod foreign;
 mod json;
@@ -56,9 +57,9 @@ fn read(
     let left_out = check::extensions(&root)?;
     let counts = check::references(&root)?;
     progress("reading buffers", 0.1);
-    let buffers = buffers::Buffers::read(&root, bytes, container.binary, folder)?;
-    let views = accessor::views(&root, &buffers, &counts)?;
-    let accessors = accessor::Accessors::read(&root, &buffers, &views)?;
+    let mut buffers = buffers::Buffers::read(&root, bytes, container.binary, folder)?;
+    let views = accessor::views(&root, &mut buffers, &counts)?;
+    let accessors = accessor::Accessors::read(&root, &mut buffers, &views)?;
     progress("reading meshes", 0.2);
     let mut textures = texture::TextureTable::read(&root)?;
     let (mut materials, material_warnings) = material::read_all(&root, &mut textures)?;
@@ -72,7 +73,7 @@ fn read(
     let foreign = foreign::read(&root, &mut meshes, &mut tree)?;
     progress("decoding images", 0.5);
     let (textures, image_warnings) =
-        textures.load(&root, &buffers, &views, folder, options.max_image_extent_px)?;
+        textures.load(&root, accessors.buffers(), &views, folder, options.max_image_extent_px)?;
     let mut prefab = Prefab::new(file_stem(path), path);
     prefab.environment = tree.environment;
     prefab.animations = animations;

@@ -1,9 +1,10 @@
-//! Images of materials: PNG and JPEG to 8-bit RGBA, with limits, and the checker that stands in for a bad one.
+//! Images of materials: PNG, JPEG, WebP and KTX 2 to 8-bit RGBA, with limits, and the checker that stands in for a bad one.
 //! In: bytes. Out: texels, first row at the top, colours as encoded in the file.
 
 use std::io::Cursor;
 use std::sync::Arc;
 
+use super::basis;
 use image::{ImageFormat, ImageReader, Limits};
 
 /// Side of the stand-in image in texels, and of its squares.
@@ -17,19 +18,24 @@ pub(super) struct Pixels {
     pub height: u32,
     pub rgba8: Arc<[u8]>,
     pub placeholder: bool,
-    /// The file that they were read from.
+    /// The PNG or JPEG that they were read from.
     pub encoded: Option<Arc<[u8]>>,
 }
 
-/// Decodes a PNG or JPEG; deeper channels are reduced to 8 bits.
+/// Decodes an image of a format that is found by its first bytes; deeper channels are reduced to 8 bits.
 pub(super) fn decode(bytes: Vec<u8>, max_extent_px: u32) -> Result<Pixels, String> {
+    if bytes.starts_with(basis::MAGIC) {
+        return basis::decode(&bytes, max_extent_px);
+    }
     let mut reader =
         ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(|error| error.to_string())?;
-    match reader.format() {
-        Some(ImageFormat::Png | ImageFormat::Jpeg) => {}
+    // What every program reads is kept as it is for exports.
+    let is_plain = match reader.format() {
+        Some(ImageFormat::Png | ImageFormat::Jpeg) => true,
+        Some(ImageFormat::WebP) => false,
         Some(other) => return Err(format!("{other:?} images are not supported here")),
-        None => return Err("it is neither PNG nor JPEG".to_owned()),
-    }
+        None => return Err("it is neither PNG, JPEG, WebP nor KTX 2".to_owned()),
+    };
     let mut limits = Limits::default();
     limits.max_image_width = Some(max_extent_px);
     limits.max_image_height = Some(max_extent_px);
@@ -42,7 +48,7 @@ pub(super) fn decode(bytes: Vec<u8>, max_extent_px: u32) -> Result<Pixels, Strin
     if width == 0 || height == 0 {
         return Err("it has no texels".to_owned());
     }
-    let encoded = Some(bytes.into());
+    let encoded = is_plain.then(|| bytes.into());
     Ok(Pixels { width, height, rgba8: image.into_raw().into(), placeholder: false, encoded })
 }
 

@@ -10,6 +10,8 @@
 mod animation;
 mod changes;
 mod common;
+mod compressed;
+mod compressed_images;
 mod copies;
 mod edits;
 mod export;

@@ -4,6 +4,7 @@
 
 use super::buffers::Buffers;
 use super::check::Counts;
+use super::compressed;
 use super::json::{Fault, Item};
 
 /// Most elements of an accessor that no bytes stand behind.
@@ -33,7 +34,7 @@ impl Component {
         }
     }
 
-    const fn bytes(self) -> usize {
+    pub const fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -77,6 +78,17 @@ impl Accessor {
     pub fn has_data(&self) -> bool {
         self.span.is_some() || self.sparse.is_some()
     }
+
+    /// Bytes of all elements.
+    pub fn byte_length(&self) -> usize {
+        self.count.saturating_mul(self.width * self.component.bytes())
+    }
+
+    /// Stands on a whole buffer of [`Self::byte_length`] bytes from now on.
+    pub fn stand_on(&mut self, buffer: usize) {
+        self.span = Some(Span { buffer, start: 0, stride: self.width * self.component.bytes() });
+        self.sparse = None;
+    }
 }
 
 /// All accessors of a file with the bytes that they look at.
@@ -94,11 +106,19 @@ pub(super) struct View {
     stride: Option<usize>,
 }
 
-/// Reads and checks the buffer views.
-pub(super) fn views(root: &Item<'_>, buffers: &Buffers, counts: &Counts) -> Result<Vec<View>, Fault> {
-    let view = |item: &Item<'_>| {
-        let buffer = item.required_index("buffer", counts.buffers, "buffer")?;
-        let start = item.size("byteOffset")?.unwrap_or(0);
+/// Reads and checks the buffer views; those that are compressed become buffers of their own.
+pub(super) fn views(root: &Item<'_>, buffers: &mut Buffers, counts: &Counts) -> Result<Vec<View>, Fault> {
+    let items = root.objects("bufferViews")?;
+    let decoded = compressed::views(&items, buffers)?;
+    let mut views = Vec::with_capacity(items.len());
+    for (item, decoded) in items.iter().zip(decoded) {
+        let (buffer, start) = match decoded {
+            Some(bytes) => (buffers.push(bytes), 0),
+            None => {
+                let buffer = item.required_index("buffer", counts.buffers, "buffer")?;
+                (buffer, item.size("byteOffset")?.unwrap_or(0))
+            }
+        };
         let length = item.required_size("byteLength")?;
         let available = buffers.bytes(buffer).len();
         let end = start.saturating_add(length);
@@ -114,17 +134,23 @@ pub(super) fn views(root: &Item<'_>, buffers: &Buffers, counts: &Counts) -> Resu
                 item.fault(format!("byteStride is {stride}, it has to be a multiple of 4 from 4 to 252"))
             );
         }
-        Ok(View { buffer, start, length, stride })
-    };
-    root.objects("bufferViews")?.iter().map(view).collect()
+        views.push(View { buffer, start, length, stride });
+    }
+    Ok(views)
 }
 
 impl<'a> Accessors<'a> {
-    /// Reads and checks all accessors.
-    pub fn read(root: &Item<'_>, buffers: &'a Buffers, views: &[View]) -> Result<Self, Fault> {
-        let list =
+    /// Reads and checks all accessors; what Draco compressed becomes buffers of its own.
+    pub fn read(root: &Item<'_>, buffers: &'a mut Buffers, views: &[View]) -> Result<Self, Fault> {
+        let mut list: Vec<Accessor> =
             root.objects("accessors")?.iter().map(|item| accessor(item, views)).collect::<Result<_, _>>()?;
+        compressed::primitives(root, buffers, views, &mut list)?;
         Ok(Self { buffers, list })
+    }
+
+    /// The bytes of the file, and what was decompressed of it.
+    pub fn buffers(&self) -> &'a Buffers {
+        self.buffers
     }
 
     /// An accessor by index; the index was checked.

@@ -47,10 +47,6 @@ impl<'a> AttributeReader<'a> {
             return Ok(None);
         };
         let accessor = self.accessors.get(position)?;
-        if primitive.extension("KHR_draco_mesh_compression")?.is_some() && !accessor.has_data() {
-            let reason = "its vertices are compressed with KHR_draco_mesh_compression, which is not read yet";
-            return Err(primitive.fault(reason));
-        }
         let count = accessor.count;
         let targets = primitive.objects("targets")?;
         let sets = joint_sets(&base, warnings)?;

@@ -7,16 +7,23 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::super::uri::{Location, resolve};
+use super::compressed;
 use super::json::{Fault, Item};
 use crate::import::require_regular_file;
 
 /// Largest image file that is read, bytes.
 const MAX_IMAGE_FILE_BYTES: u64 = 1 << 30;
+/// What compressed data may become: this many bytes, and more when the file has more.
+const MIN_DECODED_BYTES: usize = 256 << 20;
+/// Most bytes that a byte of the file may become.
+const MAX_DECODED_RATIO: usize = 64;
 
 /// The buffers of a file.
 pub(super) struct Buffers {
     file: Vec<u8>,
     list: Vec<Source>,
+    /// Bytes that compressed data may still become.
+    decoded_left: usize,
 }
 
 enum Source {
@@ -36,6 +43,10 @@ impl Buffers {
         let mut list = Vec::new();
         for (index, item) in root.objects("buffers")?.iter().enumerate() {
             let length = item.required_size("byteLength")?;
+            if is_fallback(item)? {
+                list.push(Source::Own(Vec::new()));
+                continue;
+            }
             let source = match (item.text("uri")?, &binary) {
                 (Some(uri), _) => Source::Own(read_uri(item, uri, folder, length)?),
                 (None, Some(range)) if index == 0 => Source::Chunk(range.clone()),
@@ -58,7 +69,29 @@ impl Buffers {
                 }
             });
         }
-        Ok(Self { file, list })
+        let bytes = list.iter().map(|source| match source {
+            Source::Chunk(range) => range.len(),
+            Source::Own(bytes) => bytes.len(),
+        });
+        let decoded_left = bytes.sum::<usize>().saturating_mul(MAX_DECODED_RATIO).max(MIN_DECODED_BYTES);
+        Ok(Self { file, list, decoded_left })
+    }
+
+    /// Says that compressed data is about to become so many bytes; refused when it is too much for the file.
+    pub fn claim(&mut self, bytes: usize) -> Result<(), String> {
+        self.decoded_left = self.decoded_left.checked_sub(bytes).ok_or_else(|| {
+            format!(
+                "its compressed data becomes {bytes} bytes, more than the {} that a file of this size may still have",
+                self.decoded_left
+            )
+        })?;
+        Ok(())
+    }
+
+    /// Adds bytes that were decoded; returns the index of the buffer.
+    pub fn push(&mut self, bytes: Vec<u8>) -> usize {
+        self.list.push(Source::Own(bytes));
+        self.list.len() - 1
     }
 
     /// The bytes of a buffer; none for an index that does not exist.
@@ -68,6 +101,14 @@ impl Buffers {
             Some(Source::Own(bytes)) => bytes,
             None => &[],
         }
+    }
+}
+
+/// Whether a buffer is only there for programs that cannot decompress; it may have no bytes at all.
+fn is_fallback(item: &Item<'_>) -> Result<bool, Fault> {
+    match compressed::extension(item)? {
+        Some(extension) => extension.bool_or("fallback", false),
+        None => Ok(false),
     }
 }
 

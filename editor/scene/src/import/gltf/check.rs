@@ -6,6 +6,9 @@ use super::json::{Fault, Item};
 /// Extensions that may be required: those that are read, and those that may be left out without harm.
 const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -22,17 +25,11 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_node_visibility",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
-];
-
-/// Extensions that compress data: without them there is nothing to show.
-const COMPRESSION: &[&str] = &[
-    "KHR_draco_mesh_compression",
-    "EXT_meshopt_compression",
-    "KHR_meshopt_compression",
-    "KHR_texture_basisu",
 ];
 
 /// Whether an extension is read, so that an export writes it from what the document says.
@@ -91,15 +88,8 @@ pub(super) fn extensions(root: &Item<'_>) -> Result<Vec<String>, Fault> {
     let unknown: Vec<&str> = required.into_iter().filter(|name| !SUPPORTED.contains(name)).collect();
     if !unknown.is_empty() {
         let names = unknown.join(", ");
-        let compressed = unknown.iter().any(|name| COMPRESSION.contains(name));
-        let advice = match compressed {
-            true => "; its data is compressed in a way that is not read yet: export it without",
-            false => "",
-        };
-        return Err(Fault::new(
-            "/extensionsRequired",
-            format!("the file requires {names}, which is not supported{advice}"),
-        ));
+        let reason = format!("the file requires {names}, which is not supported");
+        return Err(Fault::new("/extensionsRequired", reason));
     }
     Ok(root
         .texts("extensionsUsed")?

@@ -2,7 +2,7 @@
 //! In: JSON, buffers, the wishes of the materials. Out: decoded textures; a bad image becomes a checker and
 //! a warning.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -14,18 +14,31 @@ use super::json::{Fault, Item};
 use crate::assets::{Sampler, Texture, Wrap};
 use crate::ids::TextureId;
 
+/// Extensions that give a texture an image in a format that glTF itself does not know.
+const IMAGE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
+
 /// What one texture of the scene is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Key {
     image: Option<usize>,
+    /// What is shown if that image cannot be read.
+    fallback: Option<usize>,
     sampler: Sampler,
     srgb: bool,
 }
 
+/// What a glTF texture is made from.
+#[derive(Clone, Copy, Default)]
+struct Source {
+    image: Option<usize>,
+    fallback: Option<usize>,
+    sampler: Sampler,
+}
+
 /// Collects what materials ask for, in order of first use.
 pub(super) struct TextureTable {
-    /// Image and sampler of each glTF texture.
-    sources: Vec<(Option<usize>, Sampler, String)>,
+    /// Each glTF texture with its place.
+    sources: Vec<(Source, String)>,
     ids: HashMap<Key, TextureId>,
     wanted: Vec<(Key, String)>,
 }
@@ -37,10 +50,21 @@ impl TextureTable {
         let images = root.objects("images")?.len();
         let mut sources = Vec::new();
         for texture in root.objects("textures")? {
-            let image = texture.index("source", images, "image")?;
+            let plain = texture.index("source", images, "image")?;
+            let mut extended = None;
+            for name in IMAGE_EXTENSIONS {
+                if let Some(extension) = texture.extension(name)? {
+                    extended = extended.or(extension.index("source", images, "image")?);
+                }
+            }
             let sampler = texture.index("sampler", samplers.len(), "sampler")?;
             let sampler = sampler.and_then(|s| samplers.get(s)).copied();
-            sources.push((image, sampler.unwrap_or_default(), texture.place().to_owned()));
+            let source = Source {
+                image: extended.or(plain),
+                fallback: plain.filter(|_| extended.is_some()),
+                sampler: sampler.unwrap_or_default(),
+            };
+            sources.push((source, texture.place().to_owned()));
         }
         Ok(Self { sources, ids: HashMap::new(), wanted: Vec::new() })
     }
@@ -52,11 +76,11 @@ impl TextureTable {
 
     /// The id of a glTF texture read as colour (`srgb`) or as data.
     pub fn want(&mut self, texture: usize, srgb: bool) -> TextureId {
-        let (image, sampler, place) = match self.sources.get(texture) {
-            Some((image, sampler, place)) => (*image, *sampler, place.clone()),
-            None => (None, Sampler::default(), format!("/textures/{texture}")),
+        let (Source { image, fallback, sampler }, place) = match self.sources.get(texture) {
+            Some((source, place)) => (*source, place.clone()),
+            None => (Source::default(), format!("/textures/{texture}")),
         };
-        let key = Key { image, sampler, srgb };
+        let key = Key { image, fallback, sampler, srgb };
         let next = TextureId(self.wanted.len() as u64);
         *self.ids.entry(key).or_insert_with(|| {
             self.wanted.push((key, place));
@@ -74,41 +98,45 @@ impl TextureTable {
         max_extent_px: u32,
     ) -> Result<(Vec<Texture>, Vec<Fault>), Fault> {
         let images = root.objects("images")?;
-        let mut used: Vec<usize> = self.wanted.iter().filter_map(|(key, _)| key.image).collect();
-        used.sort_unstable();
-        used.dedup();
-        let decoded: HashMap<usize, Result<Pixels, String>> = used
-            .into_par_iter()
-            .filter_map(|index| {
-                let image = images.get(index)?;
-                let pixels =
-                    encoded(image, buffers, views, folder).and_then(|bytes| decode(bytes, max_extent_px));
-                Some((index, pixels))
-            })
-            .collect();
-        let mut warnings: Vec<Fault> = decoded
-            .iter()
-            .filter_map(|(index, pixels)| {
-                let reason = pixels.as_ref().err()?;
-                let place = format!("/images/{index}");
-                let text = format!("the image cannot be read ({reason}); a checker stands in");
-                Some(Fault::new(place, text))
-            })
-            .collect();
-        warnings.sort_by(|a, b| a.place.cmp(&b.place));
+        let decode_all = |wanted: Vec<usize>| -> BTreeMap<usize, Result<Pixels, String>> {
+            let decode = |index: usize| {
+                let bytes = encoded(images.get(index)?, buffers, views, folder);
+                Some((index, bytes.and_then(|bytes| decode(bytes, max_extent_px))))
+            };
+            let wanted: BTreeSet<usize> = wanted.into_iter().collect();
+            wanted.into_par_iter().filter_map(decode).collect()
+        };
+        let keys = || self.wanted.iter().map(|(key, _)| key);
+        let mut decoded = decode_all(keys().filter_map(|key| key.image).collect());
+        let failed = |index: &usize| decoded.get(index).is_none_or(Result::is_err);
+        let fallbacks =
+            keys().filter(|key| key.image.as_ref().is_some_and(failed)).filter_map(|key| key.fallback);
+        decoded.extend(decode_all(fallbacks.collect()));
+        let read = |index: usize| decoded.get(&index)?.as_ref().ok().map(|pixels| (index, pixels));
+
+        let mut warnings = Vec::new();
         let stand_in = placeholder();
         let mut textures = Vec::with_capacity(self.wanted.len());
-        for (key, place) in self.wanted {
+        let replaced: BTreeSet<usize> =
+            keys().filter(|key| key.fallback.and_then(read).is_some()).filter_map(|key| key.image).collect();
+        for (index, pixels) in &decoded {
+            if let Err(reason) = pixels {
+                let instead = match replaced.contains(index) {
+                    true => "the image for programs that do not know its format is shown",
+                    false => "a checker stands in",
+                };
+                let text = format!("the image cannot be read ({reason}); {instead}");
+                warnings.push(Fault::new(format!("/images/{index}"), text));
+            }
+        }
+        for (key, place) in &self.wanted {
             if key.image.is_none() {
                 let reason = "the texture has no image that can be read; a checker stands in";
                 warnings.push(Fault::new(place, reason));
             }
-            let pixels = key
-                .image
-                .and_then(|index| decoded.get(&index))
-                .and_then(|pixels| pixels.as_ref().ok())
-                .unwrap_or(&stand_in);
-            let item = key.image.and_then(|index| images.get(index));
+            let shown = key.image.and_then(read).or_else(|| key.fallback.and_then(read));
+            let pixels = shown.map_or(&stand_in, |(_, pixels)| pixels);
+            let item = shown.map(|(index, _)| index).or(key.image).and_then(|index| images.get(index));
             textures.push(Texture {
                 name: image_name(item)?,
                 width: pixels.width,

@@ -3,17 +3,17 @@
 //! Formats: KTX 2.0, sections 3 to 5; Khronos Data Format 1.3, chapters 23 (ASTC) and 25 (UASTC). The decoders were
 //! compared with those of Basis Universal 1.16, bit for bit.
 
-use ktx2::{ColorModel, Reader, SupercompressionScheme};
 use ruzstd::decoding::FrameDecoder;
 
 use super::image::Pixels;
 
 mod bits;
+mod container;
 mod etc1s;
 mod uastc;
 
-/// First bytes of a KTX 2 file.
-pub(super) const MAGIC: &[u8] = b"\xABKTX 20\xBB\r\n\x1A\n";
+pub(super) use container::MAGIC;
+use container::{Container, Encoding};
 
 /// Texels along an edge of a block.
 const BLOCK_PX: usize = 4;
@@ -57,35 +57,15 @@ impl Canvas {
 /// # Errors
 /// In words, for what is no KTX 2 file, not Basis Universal, no plain 2D texture, too large, or damaged.
 pub(super) fn decode(bytes: &[u8], max_extent_px: u32) -> Result<Pixels, String> {
-    let reader = Reader::new(bytes).map_err(|error| format!("it is no sound KTX 2 file: {error}"))?;
-    let header = reader.header();
-    let (width, height) = (header.pixel_width, header.pixel_height);
-    if width == 0 || height == 0 || header.pixel_depth > 0 || header.layer_count > 0 || header.face_count != 1
-    {
-        return Err("only plain two-dimensional KTX 2 textures are read".to_owned());
-    }
+    let Container { width, height, encoding, global, level } = Container::read(bytes)?;
     if width > max_extent_px || height > max_extent_px {
         return Err(format!("it has {width} x {height} texels, at most {max_extent_px} a side are read"));
     }
-    let level = reader.levels().next().ok_or("it has no level")?.data;
     let canvas = Canvas::new(width as usize, height as usize);
-    let rgba8 = match (reader.color_model(), header.supercompression_scheme) {
-        (Some(ColorModel::UASTC), None) => uastc::decode(level, canvas),
-        (Some(ColorModel::UASTC), Some(SupercompressionScheme::Zstandard)) => {
-            uastc::decode(&inflate(level, &canvas)?, canvas)
-        }
-        (Some(ColorModel::ETC1S), Some(SupercompressionScheme::BasisLZ)) => {
-            etc1s::decode(reader.supercompression_global_data(), level, canvas)
-        }
-        (model, scheme) => {
-            let named = |name: Option<String>| name.unwrap_or_else(|| "none".to_owned());
-            let (model, scheme) = (model.map(|m| format!("{m:?}")), scheme.map(|s| format!("{s:?}")));
-            return Err(format!(
-                "of KTX 2 only Basis Universal is read, ETC1S or UASTC; its color model is {}, its supercompression {}",
-                named(model),
-                named(scheme)
-            ));
-        }
+    let rgba8 = match encoding {
+        Encoding::Etc1s => etc1s::decode(global, level, canvas),
+        Encoding::Uastc => uastc::decode(level, canvas),
+        Encoding::UastcZstandard => uastc::decode(&inflate(level, &canvas)?, canvas),
     }?;
     Ok(Pixels { width, height, rgba8: rgba8.into(), placeholder: false, encoded: None })
 }

@@ -187,15 +187,18 @@ fn grid_file(grid: &Grid, draco: Option<&[u8]>) -> GltfFile {
     file
 }
 
+/// Rounded position, normal, texture coordinates and joints.
+type Vertex = ([i64; 3], Vec3, [f32; 2], [u16; 4]);
+
 /// Vertices in an order that does not depend on the encoder.
-fn vertices(imported: &Imported) -> Vec<([i64; 3], Vec3, [f32; 2], [u16; 4])> {
+fn vertices(imported: &Imported) -> Vec<Vertex> {
     let data = &imported.meshes[0].data;
     let joints = data.skin.as_ref().map(|skin| skin.joints.clone()).unwrap_or_default();
     let vertex = |i: usize| {
         let place = data.positions[i].to_array().map(|v| (v * 100.0).round() as i64);
         (place, data.normals[i], data.tex_coords0[i].to_array(), joints[i])
     };
-    let mut vertices: Vec<_> = (0..data.positions.len()).map(vertex).collect();
+    let mut vertices: Vec<Vertex> = (0..data.positions.len()).map(vertex).collect();
     vertices.sort_by_key(|vertex| vertex.0);
     vertices
 }
@@ -219,6 +222,9 @@ fn draco_gives_back_every_attribute() {
     }
 }
 
+/// What is done to a file.
+type Change = fn(&mut Value);
+
 fn refused(file: &GltfFile) -> ImportError {
     let folder = tempfile::tempdir().unwrap();
     load(&file.write(folder.path()), &ImportOptions::default()).unwrap_err()
@@ -229,7 +235,7 @@ fn draco_that_does_not_fit_its_accessors_is_refused() {
     let grid = grid();
     let stream = draco_grid(&grid, 3);
     let place = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression";
-    let cases: &[(&str, fn(&mut Value))] = &[
+    let cases: &[(&str, Change)] = &[
         ("ceiling", |json| json["accessors"][5]["count"] = json!(300)),
         ("vertices", |json| json["accessors"][5]["count"] = json!(30_000)),
         ("ceiling", |json| json["accessors"][0]["count"] = json!(20)),
@@ -316,7 +322,7 @@ fn meshopt_views_are_read_under_both_names() {
 fn meshopt_views_that_lie_are_refused() {
     let name = "EXT_meshopt_compression";
     let place = "/bufferViews/0/extensions/EXT_meshopt_compression";
-    let cases: &[(&str, &str, fn(&mut Value))] = &[
+    let cases: &[(&str, &str, Change)] = &[
         (place, "elements", |view| view["extensions"]["EXT_meshopt_compression"]["count"] = json!(7)),
         (place, "not in buffer", |view| {
             view["extensions"]["EXT_meshopt_compression"]["byteLength"] = json!(7000)

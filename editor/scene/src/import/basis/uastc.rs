@@ -109,7 +109,8 @@ pub(super) fn decode(blocks: &[u8], mut canvas: Canvas) -> Result<Vec<u8>, Strin
         let is_its = |mode: &Mode| code & ((1 << mode.code.1) - 1) == usize::from(mode.code.0);
         MODES.iter().position(is_its)
     });
-    let patterns = MODES.map(|mode| mode.seeds.iter().map(|&seed| pattern(seed, mode.subsets)).collect());
+    let patterns: [Vec<Pattern>; MODES.len()] =
+        MODES.map(|mode| mode.seeds.iter().map(|&seed| pattern(seed, mode.subsets)).collect());
     for (place, bytes) in blocks.as_chunks::<BLOCK_BYTES>().0.iter().enumerate() {
         let number = modes[usize::from(bytes[0] & 127)];
         let texels = number.and_then(|number| texels(u128::from_le_bytes(*bytes), number, &patterns[number]));
@@ -134,7 +135,7 @@ impl Bits {
 }
 
 /// `None` for a partition that does not exist.
-fn texels(block: u128, number: usize, patterns: &Vec<Pattern>) -> Option<Block> {
+fn texels(block: u128, number: usize, patterns: &[Pattern]) -> Option<Block> {
     let mode = MODES[number];
     let mut bits = Bits(block >> mode.code.1);
     if number == SOLID {
@@ -248,7 +249,7 @@ fn pattern(seed: u16, subsets: usize) -> Pattern {
     let shifts = if seed & 1 == 1 { [one, two] } else { [two, one] };
     let slope = |nibble: u32| {
         let value = random >> (nibble * 4) & 15;
-        value * value >> shifts[nibble as usize % 2]
+        (value * value) >> shifts[nibble as usize % 2]
     };
     std::array::from_fn(|texel| {
         // Small blocks are spread to twice their size.

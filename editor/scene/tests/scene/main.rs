@@ -13,6 +13,7 @@ mod common;
 mod compressed;
 mod compressed_images;
 mod copies;
+mod core_features;
 mod edits;
 mod export;
 mod export_edits;

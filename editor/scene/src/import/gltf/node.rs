@@ -57,6 +57,11 @@ pub(super) fn read_scene(root: &Item<'_>, accessors: &Accessors<'_>, meshes: &[M
     };
     let mut tree =
         Tree { environment: scene.as_ref().map(read_environment).transpose()?.flatten(), ..Tree::default() };
+    let scenes = root.items("scenes")?.len();
+    if let Some(scene) = scene.filter(|_| scenes > 1) {
+        tree.warnings
+            .push(scene.fault(format!("of {scenes} scenes this one is read, the others are left out")));
+    }
     tree.part_of_node = vec![None; nodes.len()];
     let mut stack: Vec<(usize, Option<u32>)> = roots.iter().rev().map(|&n| (n, None)).collect();
     let mut seen = vec![false; nodes.len()];

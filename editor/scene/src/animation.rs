@@ -4,6 +4,13 @@
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
+mod property;
+
+pub(crate) use property::Animated;
+pub use property::Property;
+
+use crate::ids::MaterialId;
+
 /// Sine of the angle between two rotations below which they are mixed on a straight line.
 const NEARLY_EQUAL_SINE: f64 = 1e-9;
 
@@ -75,6 +82,21 @@ pub enum ChannelPath {
     Scale,
     /// Weights of the morph targets.
     Weights,
+    /// Whether it and all below it are there; 0: hidden.
+    Visibility,
+    /// A property of the light that the part is.
+    Light(Property),
+    /// A property of the camera that the part is.
+    Camera(Property),
+    /// A property of a material, wherever it is used.
+    Material(MaterialId, Property),
+}
+
+impl ChannelPath {
+    /// Whether it moves its part.
+    pub fn is_transform(self) -> bool {
+        matches!(self, Self::Translation | Self::Rotation | Self::Scale)
+    }
 }
 
 /// What is between two keys.
@@ -92,7 +114,7 @@ pub enum Interpolation {
 /// Key frames of one thing that moves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Which part of the prefab.
+    /// Which part of the prefab; of no account where a material changes.
     pub part: u32,
     /// What of it.
     pub path: ChannelPath,
@@ -116,6 +138,10 @@ pub enum Sample {
     Scale(DVec3),
     /// One a morph target.
     Weights(Vec<f32>),
+    /// Whether it is there.
+    Visibility(bool),
+    /// Of a property.
+    Numbers(Vec<f32>),
 }
 
 /// Where a time lies among the keys.
@@ -150,10 +176,16 @@ impl Channel {
             ChannelPath::Translation => Sample::Translation(vector()),
             ChannelPath::Scale => Sample::Scale(vector()),
             ChannelPath::Rotation => Sample::Rotation(self.rotation(place)),
-            ChannelPath::Weights => {
-                Sample::Weights((0..self.width()).map(|i| self.mixed(place, i) as f32).collect())
+            ChannelPath::Weights => Sample::Weights(self.numbers(place)),
+            ChannelPath::Visibility => Sample::Visibility(self.mixed(place, 0) != 0.0),
+            ChannelPath::Light(_) | ChannelPath::Camera(_) | ChannelPath::Material(..) => {
+                Sample::Numbers(self.numbers(place))
             }
         })
+    }
+
+    fn numbers(&self, place: Place) -> Vec<f32> {
+        (0..self.width()).map(|i| self.mixed(place, i) as f32).collect()
     }
 
     /// Sets of numbers that a key has.

@@ -27,6 +27,7 @@ mod copies;
 mod lock;
 mod place;
 mod pose;
+mod pose_values;
 mod propagate;
 mod report;
 mod surroundings;
@@ -61,6 +62,10 @@ pub struct Document {
     /// Instances whose source has clips.
     animated: BTreeSet<NodeId>,
     surroundings: Surroundings,
+    /// What the time that is shown says about materials.
+    material_pose: BTreeMap<MaterialId, pose::Numbers>,
+    /// The poses of instances say something else about materials than when that was made.
+    material_pose_stale: bool,
     /// An edit is being undone: what it sets was in the document before, and need not fit what has become of it since.
     restoring: bool,
 }
@@ -133,6 +138,8 @@ impl Document {
             time_s: None,
             animated: BTreeSet::new(),
             surroundings: Surroundings::default(),
+            material_pose: BTreeMap::new(),
+            material_pose_stale: false,
             restoring: false,
         }
     }

@@ -329,6 +329,13 @@ impl<'a> Writer<'a> {
         if animation::plays_otherwise(self.document, tree) {
             self.warn("animations", "which clips are played is left out: all are written, in order");
         }
+        match animation::left_out(self.document, tree) {
+            0 => {}
+            count => self.warn(
+                "animations",
+                format!("{count} channels of visibility, lights, cameras and materials are left out"),
+            ),
+        }
         let first = self.document.cameras().map(|camera| camera.target).min_by_key(|t| tree.places.get(t));
         if self.document.default_camera().is_some_and(|chosen| Some(chosen) != first) {
             self.warn("cameras", "which of them renders is left out: a reader takes the first");

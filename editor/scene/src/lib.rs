@@ -18,7 +18,7 @@ mod prefab;
 mod project;
 mod transform;
 
-pub use animation::{Animation, Channel, ChannelPath, ClipChoice, Interpolation, Sample};
+pub use animation::{Animation, Channel, ChannelPath, ClipChoice, Interpolation, Property, Sample};
 pub use assets::{
     AlphaMode, Anisotropy, Camera, Clearcoat, Cloud, DeformPose, DiffuseTransmission, Distribution,
     Environment, EnvironmentFile, Iridescence, Light, LightKind, MAX_RADIANCE, MOST_SHAPES, Material, Mesh,

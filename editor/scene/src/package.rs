@@ -71,6 +71,7 @@ fn package(id: PrefabId, imported: Imported, ids: &AssetIds) -> PrefabPackage {
     prefab.meshes.clone_from(&ids.meshes);
     prefab.materials.clone_from(&ids.materials);
     prefab.textures.clone_from(&ids.textures);
+    prefab.map_animated_materials(|index| ids.material(index));
     prefab.map_meshes(|index| lookup(&ids.meshes, index.0).unwrap_or(index));
     let meshes = meshes.into_iter().map(|mut mesh| {
         for primitive in &mut mesh.primitives {

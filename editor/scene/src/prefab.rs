@@ -11,7 +11,7 @@ use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::animation::Animation;
+use crate::animation::{Animation, Channel, ChannelPath};
 use crate::assets::{Camera, Environment, Light};
 use crate::foreign::{Foreign, Mapping};
 use crate::ids::{MaterialId, MeshId, TextureId};
@@ -234,6 +234,18 @@ impl Prefab {
             Some(((*self.meshes.get(mesh)?, primitive as u32), *self.materials.get(mapping.material)?))
         };
         self.foreign.mappings.iter().filter_map(chosen).collect()
+    }
+
+    /// Puts other ids in place of the materials that clips change.
+    pub(crate) fn map_animated_materials(&mut self, map: impl Fn(MaterialId) -> MaterialId) {
+        let changes_material = |channel: &Channel| matches!(channel.path, ChannelPath::Material(..));
+        for clip in self.animations.iter_mut().filter(|clip| clip.channels.iter().any(changes_material)) {
+            for channel in &mut Arc::make_mut(clip).channels {
+                if let ChannelPath::Material(material, _) = &mut channel.path {
+                    *material = map(*material);
+                }
+            }
+        }
     }
 
     /// Puts other mesh ids in place.

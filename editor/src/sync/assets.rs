@@ -122,10 +122,10 @@ impl Assets {
         let materials: BTreeSet<_> =
             touched.new_materials.iter().chain(&changes.materials).copied().collect();
         for id in materials {
-            let Some(material) = document.material(id) else { continue };
+            let Some(material) = document.posed_material(id) else { continue };
             let Some((_, old)) = self.materials.get_mut(&id) else { continue };
             // A texture that its prefab has taken along is shown as none.
-            let sent = material_of(material, |texture| document.texture(texture).is_some());
+            let sent = material_of(&material, |texture| document.texture(texture).is_some());
             let used: Vec<TextureId> = sent.textures().map(|used| TextureId(used.texture.0)).collect();
             let old = std::mem::replace(old, used.clone());
             for texture in &used {

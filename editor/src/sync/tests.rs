@@ -4,10 +4,15 @@
 mod mirror;
 pub(super) mod rig;
 
+use std::sync::Arc;
+
 use super::*;
-use caustica_scene::{Edit, Light, LightKind, Local, MaterialId, Node, NodeKind, SkinData, Trs};
+use caustica_scene::{
+    Animation, Channel, ChannelPath, Edit, Interpolation, Light, LightKind, Local, MaterialId, Node,
+    NodeKind, Property, SkinData, Trs,
+};
 use glam::{Affine3A, Vec3};
-use rig::{BODY, BOX, JOINT, LAMP, Rig, STATUE, TWIN, filled};
+use rig::{BODY, BOX, JOINT, LAMP, Rig, STATUE, TWIN, body, filled, imported};
 
 fn light() -> NodeKind {
     NodeKind::Light(Light {
@@ -206,6 +211,32 @@ fn materials_come_and_go_with_their_textures() {
     assert_eq!(filled(&delta), [("removed textures", 1), ("materials", 1)]);
     let material = delta::MaterialId(textured.0);
     assert_eq!(delta.materials.iter().map(|(id, _)| *id).collect::<Vec<_>>(), [material]);
+}
+
+/// A clip changes a material: it is sent as the time has it.
+#[test]
+fn materials_are_sent_in_their_pose() {
+    let roughness = Property::of_material("pbrMetallicRoughness/roughnessFactor").unwrap();
+    let mut file = imported(body());
+    file.prefab.animations = vec![Arc::new(Animation::new(
+        "polish",
+        vec![Channel {
+            part: 0,
+            path: ChannelPath::Material(MaterialId(0), roughness),
+            interpolation: Interpolation::Linear,
+            times_s: vec![0.0, 1.0],
+            values: vec![1.0, 0.0],
+        }],
+    ))];
+    let mut rig = Rig::of(file);
+    rig.delta();
+    let material: MaterialId = rig.document.renderable(rig.part(BOX)).unwrap().materials[0];
+    rig.document.set_time(Some(0.5));
+    let delta = rig.delta();
+    assert_eq!(filled(&delta), [("materials", 1)]);
+    assert_eq!((delta.materials[0].0, delta.materials[0].1.roughness), (delta::MaterialId(material.0), 0.5));
+    rig.document.set_time(None);
+    assert_eq!(rig.delta().materials[0].1.roughness, 1.0);
 }
 
 #[test]

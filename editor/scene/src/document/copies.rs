@@ -106,6 +106,7 @@ fn renumbered_package(package: PrefabPackage, renumber: Renumber<'_>) -> PrefabP
     prefab.materials.iter_mut().for_each(|id| *id = material_id(*id));
     prefab.textures.iter_mut().for_each(|id| *id = texture_id(*id));
     prefab.map_meshes(mesh_id);
+    prefab.map_animated_materials(material_id);
     PrefabPackage {
         id: PrefabId(renumber(id.0)),
         prefab,

@@ -62,14 +62,14 @@ impl Document {
         })
     }
 
-    /// One placed light.
+    /// One placed light, as the time that is shown has it.
     pub fn light(&self, target: Target) -> Option<Placed<Light>> {
-        self.placed(target, self.light_of(target)?)
+        self.placed(target, self.posed_light(target)?)
     }
 
-    /// One placed camera.
+    /// One placed camera, as the time that is shown has it.
     pub fn camera(&self, target: Target) -> Option<Placed<Camera>> {
-        self.placed(target, self.camera_of(target)?)
+        self.placed(target, self.posed_camera(target)?)
     }
 
     /// Every placed mesh, in order of target.

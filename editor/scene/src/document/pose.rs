@@ -8,9 +8,9 @@ use std::sync::Arc;
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::{Document, PartStates, prefab_of};
-use crate::animation::{Animation, ClipChoice, Sample};
+use crate::animation::{Animation, ChannelPath, ClipChoice, Property, Sample};
 use crate::assets::{DeformPose, Mesh};
-use crate::ids::{NodeId, PrefabId, Target};
+use crate::ids::{MaterialId, NodeId, PrefabId, Target};
 use crate::node::{Node, NodeKind};
 use crate::prefab::{PartNode, Prefab};
 use crate::transform::Local;
@@ -20,7 +20,14 @@ use crate::transform::Local;
 pub(super) struct Pose {
     moved: BTreeMap<u32, Moved>,
     weights: BTreeMap<u32, Vec<f32>>,
+    pub(super) visible: BTreeMap<u32, bool>,
+    pub(super) lights: BTreeMap<u32, Numbers>,
+    pub(super) cameras: BTreeMap<u32, Numbers>,
+    pub(super) materials: BTreeMap<MaterialId, Numbers>,
 }
+
+/// The properties that a clip changes, with their numbers.
+pub(super) type Numbers = BTreeMap<Property, Vec<f32>>;
 
 /// What a time says about the transform of one part; the rest is as the document has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,6 +48,12 @@ pub struct Driven {
     pub scale: bool,
     /// Weights of the morph targets.
     pub weights: bool,
+    /// Whether it is there.
+    pub visibility: bool,
+    /// Something of the light that it is.
+    pub light: bool,
+    /// Something of the camera that it is.
+    pub camera: bool,
 }
 
 impl Pose {
@@ -53,24 +66,31 @@ impl Pose {
                 let Some(sample) = channel.sample(local_s) else {
                     continue;
                 };
-                pose.lay(channel.part, sample);
+                pose.lay(channel.part, channel.path, sample);
             }
         }
         pose
     }
 
     /// The first to move a thing has it.
-    fn lay(&mut self, part: u32, sample: Sample) {
-        if let Sample::Weights(weights) = sample {
-            self.weights.entry(part).or_insert(weights);
-            return;
-        }
-        let moved = self.moved.entry(part).or_default();
+    fn lay(&mut self, part: u32, path: ChannelPath, sample: Sample) {
         match sample {
-            Sample::Translation(translation) => _ = moved.translation.get_or_insert(translation),
-            Sample::Rotation(rotation) => _ = moved.rotation.get_or_insert(rotation),
-            Sample::Scale(scale) => _ = moved.scale.get_or_insert(scale),
-            Sample::Weights(_) => {}
+            Sample::Weights(weights) => _ = self.weights.entry(part).or_insert(weights),
+            Sample::Visibility(visible) => _ = self.visible.entry(part).or_insert(visible),
+            Sample::Translation(value) => {
+                _ = self.moved.entry(part).or_default().translation.get_or_insert(value)
+            }
+            Sample::Rotation(value) => _ = self.moved.entry(part).or_default().rotation.get_or_insert(value),
+            Sample::Scale(value) => _ = self.moved.entry(part).or_default().scale.get_or_insert(value),
+            Sample::Numbers(numbers) => {
+                let (of_thing, property) = match path {
+                    ChannelPath::Light(property) => (self.lights.entry(part).or_default(), property),
+                    ChannelPath::Camera(property) => (self.cameras.entry(part).or_default(), property),
+                    ChannelPath::Material(id, property) => (self.materials.entry(id).or_default(), property),
+                    _ => return,
+                };
+                of_thing.entry(property).or_insert(numbers);
+            }
         }
     }
 }
@@ -169,6 +189,9 @@ impl Document {
             rotation: moved.rotation.is_some(),
             scale: moved.scale.is_some(),
             weights: pose.weights.contains_key(&part),
+            visibility: pose.visible.contains_key(&part),
+            light: pose.lights.contains_key(&part),
+            camera: pose.cameras.contains_key(&part),
         }
     }
 
@@ -269,12 +292,25 @@ impl Document {
         let mut differs = false;
         // Whole subtrees are computed again: of nested parts the topmost is enough.
         let mut covered = 0;
-        for part in differing(&old.moved, &pose.moved) {
+        let moved = differing(&old.moved, &pose.moved);
+        for part in moved.union(&differing(&old.visible, &pose.visible)).copied() {
             if part >= covered {
                 self.dirty_parts.insert(Target::part(node, part));
                 covered = prefab.subtree_end(part);
                 differs = true;
             }
+        }
+        for part in differing(&old.lights, &pose.lights) {
+            self.changes.lights.insert(Target::part(node, part));
+            differs = true;
+        }
+        for part in differing(&old.cameras, &pose.cameras) {
+            self.changes.cameras.insert(Target::part(node, part));
+            differs = true;
+        }
+        if old.materials != pose.materials {
+            self.material_pose_stale = true;
+            differs = true;
         }
         let parts = &slot.parts;
         for index in differing(&old.weights, &pose.weights) {
@@ -293,6 +329,6 @@ impl Document {
 }
 
 /// The keys at which two maps differ, in order.
-fn differing<T: PartialEq>(a: &BTreeMap<u32, T>, b: &BTreeMap<u32, T>) -> BTreeSet<u32> {
+pub(super) fn differing<K: Ord + Copy, T: PartialEq>(a: &BTreeMap<K, T>, b: &BTreeMap<K, T>) -> BTreeSet<K> {
     a.keys().chain(b.keys()).filter(|key| a.get(key) != b.get(key)).copied().collect()
 }

@@ -61,11 +61,11 @@ impl Document {
         }
     }
 
-    /// Whether a target and everything above it is visible.
+    /// Whether a target and everything above it is visible in the pose of the time that is shown.
     pub fn effectively_visible(&self, target: Target) -> bool {
         self.contains(target)
             && std::iter::successors(Some(target), |&t| self.parent_of(t))
-                .all(|t| self.visible(t) == Some(true))
+                .all(|t| self.posed_visible(t) == Some(true))
     }
 
     fn world_from_node(&self, node: NodeId) -> Option<DAffine3> {
@@ -222,7 +222,7 @@ fn update_parts(
         let content = part_content(part);
         let local = slot.parts.posed_local(index, part).to_affine();
         let parts = &mut slot.parts;
-        let visible = parts.overrides.get(&index).and_then(|o| o.visible).unwrap_or(part.visible);
+        let visible = parts.posed_visible(index, part);
         let above = part.parent.map(|parent| parent as usize);
         let world = above.and_then(|p| parts.worlds.get(p).copied()).unwrap_or(slot.world) * local;
         let shown = above.and_then(|p| parts.shown.get(p).copied()).unwrap_or(slot.shown) && visible;

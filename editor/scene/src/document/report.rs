@@ -8,13 +8,17 @@ use crate::prefab::Prefab;
 impl Document {
     /// Whether [`Self::drain_changes`] would tell of anything.
     pub fn has_changes(&self) -> bool {
-        !self.dirty.is_empty() || !self.dirty_parts.is_empty() || self.changes != ChangeSet::default()
+        self.material_pose_stale
+            || !self.dirty.is_empty()
+            || !self.dirty_parts.is_empty()
+            || self.changes != ChangeSet::default()
     }
 
     /// Brings transforms up to date and hands out what changed since the last call. The first call tells of
     /// everything as added. Work is proportional to the change.
     pub fn drain_changes(&mut self) -> ChangeSet {
         self.update_transforms();
+        self.update_material_pose();
         let mut changes = std::mem::take(&mut self.changes);
         let known_whole = |target: &Target| !changes.added.contains_key(target);
         changes.lights.retain(known_whole);
@@ -62,6 +66,7 @@ impl Document {
         let prefab = prefab_of(&self.prefabs, slot);
         if prefab.is_some_and(Prefab::is_animated) {
             self.animated.insert(id);
+            self.material_pose_stale |= self.time_s.is_some();
         }
         for (target, content) in contents(id, slot, prefab) {
             self.changes.target_added(target, content);
@@ -78,7 +83,7 @@ impl Document {
             let known = self.reported.contains(&target);
             self.changes.target_removed(target, content, known);
         }
-        self.animated.remove(&id);
+        self.material_pose_stale |= self.animated.remove(&id) && self.time_s.is_some();
         self.surroundings.remove(id);
     }
 }

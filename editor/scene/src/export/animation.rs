@@ -49,7 +49,7 @@ pub(super) fn moving(document: &Document, tree: &Tree) -> BTreeSet<Target> {
     for &(node, prefab) in &tree.instances {
         let clips = document.prefab(prefab).map_or(&[][..], |prefab| &prefab.animations);
         let channels = clips.iter().flat_map(|clip| &clip.channels);
-        let transforms = channels.filter(|channel| channel.path != ChannelPath::Weights);
+        let transforms = channels.filter(|channel| channel.path.is_transform());
         moving.extend(transforms.map(|channel| Target::part(node, channel.part)));
     }
     moving
@@ -63,7 +63,9 @@ pub(super) fn clips(document: &Document, tree: &Tree, buffer: &mut Buffer) -> Ve
             tree.instances.iter().filter(|(_, prefab)| *prefab == id).map(|(node, _)| *node).collect();
         let clips = document.prefab(id).map_or(&[][..], |prefab| &prefab.animations);
         // A clip that moves nothing is not allowed.
-        for clip in clips.iter().filter(|clip| !clip.channels.is_empty()) {
+        for clip in
+            clips.iter().filter(|clip| clip.channels.iter().any(|channel| path_name(channel.path).is_some()))
+        {
             list.push(Value::Object(write_clip(clip, &nodes, tree, buffer)));
         }
     }
@@ -84,11 +86,12 @@ pub(super) fn plays_otherwise(document: &Document, tree: &Tree) -> bool {
 fn write_clip(clip: &Animation, nodes: &[NodeId], tree: &Tree, buffer: &mut Buffer) -> Object {
     let (mut channels, mut samplers) = (Vec::new(), Vec::new());
     for channel in &clip.channels {
+        let Some(path) = path_name(channel.path) else { continue };
         for node in nodes {
             for place in places(channel, *node, tree) {
                 let mut target = Object::new();
                 target.put("node", place);
-                target.put("path", path_name(channel.path));
+                target.put("path", path);
                 let mut object = Object::new();
                 object.put("sampler", samplers.len());
                 object.put("target", target);
@@ -125,13 +128,25 @@ fn places(channel: &Channel, node: NodeId, tree: &Tree) -> Vec<usize> {
         .collect()
 }
 
-fn path_name(path: ChannelPath) -> &'static str {
+/// `None` for what is left out: its pointer would have to be written anew.
+fn path_name(path: ChannelPath) -> Option<&'static str> {
     match path {
-        ChannelPath::Translation => "translation",
-        ChannelPath::Rotation => "rotation",
-        ChannelPath::Scale => "scale",
-        ChannelPath::Weights => "weights",
+        ChannelPath::Translation => Some("translation"),
+        ChannelPath::Rotation => Some("rotation"),
+        ChannelPath::Scale => Some("scale"),
+        ChannelPath::Weights => Some("weights"),
+        ChannelPath::Visibility
+        | ChannelPath::Light(_)
+        | ChannelPath::Camera(_)
+        | ChannelPath::Material(..) => None,
     }
+}
+
+/// Channels of the placed prefabs that are left out.
+pub(super) fn left_out(document: &Document, tree: &Tree) -> usize {
+    let clips =
+        tree.prefabs().into_iter().filter_map(|id| document.prefab(id)).flat_map(|prefab| &prefab.animations);
+    clips.flat_map(|clip| &clip.channels).filter(|channel| path_name(channel.path).is_none()).count()
 }
 
 fn write_sampler(channel: &Channel, buffer: &mut Buffer) -> Object {
@@ -148,7 +163,7 @@ fn write_sampler(channel: &Channel, buffer: &mut Buffer) -> Object {
             buffer.floats(channel.values.as_chunks::<3>().0, false, Use::Other)
         }
         ChannelPath::Rotation => buffer.floats(channel.values.as_chunks::<4>().0, false, Use::Other),
-        ChannelPath::Weights => buffer.floats(channel.values.as_chunks::<1>().0, false, Use::Other),
+        _ => buffer.floats(channel.values.as_chunks::<1>().0, false, Use::Other),
     };
     object.put("output", place);
     object

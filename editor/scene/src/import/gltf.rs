@@ -69,7 +69,7 @@ fn read(
     }
     let mut tree = node::read_scene(&root, &accessors, &meshes.list)?;
     let skins = skin::read_all(&root, &accessors, &meshes.list, &mut tree)?;
-    let animations = animation::read_all(&root, &accessors, &meshes.list, &mut tree)?;
+    let animations = animation::read_all(&root, &accessors, &meshes.list, &materials, &mut tree)?;
     let foreign = foreign::read(&root, &mut meshes, &mut tree)?;
     progress("decoding images", 0.5);
     let (textures, image_warnings) =

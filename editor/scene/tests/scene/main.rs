@@ -8,6 +8,7 @@
 )]
 
 mod animation;
+mod animation_pointer;
 mod changes;
 mod common;
 mod compressed;

@@ -35,10 +35,15 @@ pub struct Rig {
 impl Rig {
     /// Not synced yet.
     pub fn unsynced() -> Self {
+        Self::of(imported(body()))
+    }
+
+    /// One instance of a file, not synced yet.
+    pub fn of(imported: Imported) -> Self {
         let mut document = Document::new();
         // What shines or not makes no difference to the surroundings.
         document.apply(Edit::SetEnvironment(Environment::Constant(Vec3::ONE))).unwrap();
-        let prefab = document.add_imported(imported(body())).unwrap();
+        let prefab = document.add_imported(imported).unwrap();
         let (node, edit) = document.instantiate_edit(prefab, None, Local::default());
         document.apply(edit).unwrap();
         Self { document, sync: Sync::new(), prefab, node }

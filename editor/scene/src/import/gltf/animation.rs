@@ -1,5 +1,5 @@
-//! Animations: channels with their key frames.
-//! In: JSON, checked accessors and the tree. Out: clips whose times grow and whose numbers are finite. A channel
+//! Animations: channels with their key frames. What `KHR_animation_pointer` points at is found in `pointer.rs`.
+//! In: JSON, checked accessors, materials and the tree. Out: clips whose times grow and whose numbers are finite. A channel
 //! that does not hold what it has to is left out with a warning; the rest of the file does not depend on it.
 
 use std::collections::HashSet;
@@ -9,18 +9,22 @@ use super::accessor::{Accessors, Component};
 use super::json::{Fault, Item};
 use super::node::Tree;
 use crate::animation::{Animation, Channel, ChannelPath, Interpolation};
-use crate::assets::Mesh;
+use crate::assets::{Camera, Light, Material, Mesh};
 use crate::transform::Local;
+
+mod pointer;
 
 /// Reads all animations in the order of the file.
 pub(super) fn read_all(
     root: &Item<'_>,
     accessors: &Accessors<'_>,
     meshes: &[Mesh],
+    materials: &[Material],
     tree: &mut Tree,
 ) -> Result<Vec<Arc<Animation>>, Fault> {
     let mut warnings = Vec::new();
-    let reader = Reader { accessors, meshes, tree };
+    let nodes = root.objects("nodes")?;
+    let reader = Reader { accessors, meshes, materials, nodes, tree };
     let mut clips = Vec::new();
     for item in root.objects("animations")? {
         clips.push(Arc::new(reader.read(&item, &mut warnings)?));
@@ -32,8 +36,13 @@ pub(super) fn read_all(
 struct Reader<'a> {
     accessors: &'a Accessors<'a>,
     meshes: &'a [Mesh],
+    materials: &'a [Material],
+    nodes: Vec<Item<'a>>,
     tree: &'a Tree,
 }
+
+/// What a channel of the file changes, once for each part where it is.
+type Targets = Vec<(u32, ChannelPath)>;
 
 impl Reader<'_> {
     fn read(&self, item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Animation, Fault> {
@@ -47,52 +56,54 @@ impl Reader<'_> {
                 continue;
             };
             match self.read_channel(sampler, &target)? {
-                Ok(Some(read)) if !seen.insert((read.part, read.path)) => {
-                    warnings.push(channel.fault("another channel moves the same; it was left out"));
+                Ok(read) => {
+                    for read in read {
+                        if !seen.insert((read.part, read.path)) {
+                            warnings.push(channel.fault("another channel moves the same; it was left out"));
+                            continue;
+                        }
+                        self.warn_about(&channel, &read, warnings);
+                        channels.push(read);
+                    }
                 }
-                Ok(Some(read)) => {
-                    self.warn_about_matrix(&channel, &read, warnings);
-                    channels.push(read);
-                }
-                Ok(None) => {}
                 Err(reason) => warnings.push(channel.fault(format!("{reason}; it was left out"))),
             }
         }
         Ok(Animation::new(item.name()?, channels))
     }
 
-    fn warn_about_matrix(&self, item: &Item<'_>, channel: &Channel, warnings: &mut Vec<Fault>) {
+    fn warn_about(&self, item: &Item<'_>, channel: &Channel, warnings: &mut Vec<Fault>) {
         let part = self.tree.parts.get(channel.part as usize);
         let sheared = part.is_some_and(|part| matches!(part.local, Local::Matrix(_)));
-        if sheared && channel.path != ChannelPath::Weights {
+        if sheared && channel.path.is_transform() {
             warnings.push(item.fault("its node has a matrix with shear, which is dropped while it plays"));
+        }
+        let (least, largest) = match channel.path {
+            ChannelPath::Light(property) => property.range::<Light>(),
+            ChannelPath::Camera(property) => property.range::<Camera>(),
+            ChannelPath::Material(_, property) => property.range::<Material>(),
+            _ => return,
+        };
+        // The tangents of a spline are no values.
+        let is_value = channel.interpolation != Interpolation::CubicSpline;
+        if is_value && channel.values.iter().any(|value| !(least..=largest).contains(value)) {
+            let largest = if largest == f32::MAX { "any number".to_owned() } else { largest.to_string() };
+            warnings.push(item.fault(format!("its values are held to {least} to {largest}")));
         }
     }
 
-    /// A channel; `None` without a node, which moves nothing; or why it cannot be played, in words.
+    /// Channels for all that one of the file changes, none where that is nothing; or why it cannot be played, in words.
     fn read_channel(
         &self,
         sampler: &Item<'_>,
         target: &Item<'_>,
-    ) -> Result<Result<Option<Channel>, String>, Fault> {
-        let path = target.text("path")?.unwrap_or_default();
-        let path = match path {
-            "translation" => ChannelPath::Translation,
-            "rotation" => ChannelPath::Rotation,
-            "scale" => ChannelPath::Scale,
-            "weights" => ChannelPath::Weights,
-            "pointer" => {
-                let extension = target.extension("KHR_animation_pointer")?;
-                let pointer = extension.and_then(|e| e.text("pointer").ok().flatten()).unwrap_or_default();
-                return Ok(Err(format!("KHR_animation_pointer is not played ({pointer})")));
-            }
-            other => return Ok(Err(format!("path {other:?} does not exist"))),
+    ) -> Result<Result<Vec<Channel>, String>, Fault> {
+        let targets = match self.targets(target)? {
+            Ok(targets) => targets,
+            Err(reason) => return Ok(Err(reason)),
         };
-        let Some(node) = target.size("node")? else {
-            return Ok(Ok(None));
-        };
-        let Some(part) = self.tree.part_of_node.get(node).copied().flatten() else {
-            return Ok(Err(format!("node {node} is not in the scene")));
+        let Some(&(part, path)) = targets.first() else {
+            return Ok(Ok(Vec::new()));
         };
         let interpolation = match sampler.text("interpolation")? {
             None | Some("LINEAR") => Interpolation::Linear,
@@ -100,20 +111,73 @@ impl Reader<'_> {
             Some("CUBICSPLINE") => Interpolation::CubicSpline,
             Some(other) => return Ok(Err(format!("interpolation {other:?} does not exist"))),
         };
-        let width = match path {
+        if path == ChannelPath::Visibility && interpolation != Interpolation::Step {
+            return Ok(Err("visibility has steps only".to_owned()));
+        }
+        let width = self.width(part, path);
+        if width == 0 {
+            let reason = match path {
+                ChannelPath::Weights => "its mesh has no morph targets",
+                _ => "what it points at has no such property",
+            };
+            return Ok(Err(reason.to_owned()));
+        }
+        let (times_s, values) = (self.read_times(sampler)?, self.read_values(sampler, path, width)?);
+        let (times_s, values) = match (times_s, values) {
+            (Ok(times_s), Ok(values)) => (times_s, values),
+            (Err(reason), _) | (_, Err(reason)) => return Ok(Err(reason)),
+        };
+        let channel = Channel { part, path, interpolation, times_s, values };
+        if let Err(reason) = sound(&channel, width) {
+            return Ok(Err(reason));
+        }
+        // Another node of the same mesh, light or camera has the same widths.
+        Ok(Ok(targets.into_iter().map(|(part, path)| Channel { part, path, ..channel.clone() }).collect()))
+    }
+
+    /// What a channel changes; none without a node, as then nothing moves.
+    fn targets(&self, target: &Item<'_>) -> Result<Result<Targets, String>, Fault> {
+        let path = match target.text("path")?.unwrap_or_default() {
+            "translation" => ChannelPath::Translation,
+            "rotation" => ChannelPath::Rotation,
+            "scale" => ChannelPath::Scale,
+            "weights" => ChannelPath::Weights,
+            "pointer" => {
+                let extension = target.extension("KHR_animation_pointer")?;
+                let pointer = match &extension {
+                    Some(extension) => extension.text("pointer")?.unwrap_or_default(),
+                    None => "",
+                };
+                let targets = self.pointed_at(pointer)?;
+                return Ok(targets.ok_or_else(|| format!("what {pointer:?} points at cannot be animated")));
+            }
+            other => return Ok(Err(format!("path {other:?} does not exist"))),
+        };
+        let Some(node) = target.size("node")? else {
+            return Ok(Ok(Vec::new()));
+        };
+        let part = self.tree.part_of_node.get(node).copied().flatten();
+        Ok(part.map(|part| vec![(part, path)]).ok_or_else(|| format!("node {node} is not in the scene")))
+    }
+
+    /// Numbers in one value; 0: there is no such thing.
+    fn width(&self, part: u32, path: ChannelPath) -> usize {
+        let node = self.tree.parts.get(part as usize);
+        match path {
             ChannelPath::Translation | ChannelPath::Scale => 3,
             ChannelPath::Rotation => 4,
             ChannelPath::Weights => self.target_count(part),
-        };
-        if width == 0 {
-            return Ok(Err(format!("the mesh of node {node} has no morph targets")));
+            ChannelPath::Visibility => 1,
+            ChannelPath::Light(property) => {
+                node.and_then(|node| node.light).map_or(0, |l| property.width_in(&l))
+            }
+            ChannelPath::Camera(property) => {
+                node.and_then(|node| node.camera).map_or(0, |c| property.width_in(&c))
+            }
+            ChannelPath::Material(id, property) => {
+                self.materials.get(id.0 as usize).map_or(0, |material| property.width_in(material))
+            }
         }
-        let (times_s, values) = (self.read_times(sampler)?, self.read_values(sampler, path)?);
-        let channel = match (times_s, values) {
-            (Ok(times_s), Ok(values)) => Channel { part, path, interpolation, times_s, values },
-            (Err(reason), _) | (_, Err(reason)) => return Ok(Err(reason)),
-        };
-        Ok(sound(&channel, width).map(|()| Some(channel)))
     }
 
     fn target_count(&self, part: u32) -> usize {
@@ -135,14 +199,16 @@ impl Reader<'_> {
         })
     }
 
-    fn read_values(&self, sampler: &Item<'_>, path: ChannelPath) -> Result<Result<Vec<f32>, String>, Fault> {
+    /// The numbers of all keys; the weights of morph targets are single ones.
+    fn read_values(
+        &self,
+        sampler: &Item<'_>,
+        path: ChannelPath,
+        width: usize,
+    ) -> Result<Result<Vec<f32>, String>, Fault> {
         let index = sampler.required_size("output")?;
         let accessor = self.accessors.get(index)?;
-        let wanted = match path {
-            ChannelPath::Translation | ChannelPath::Scale => 3,
-            ChannelPath::Rotation => 4,
-            ChannelPath::Weights => 1,
-        };
+        let wanted = if path == ChannelPath::Weights { 1 } else { width };
         if accessor.is_matrix || accessor.width != wanted || accessor.component == Component::U32 {
             return Ok(Err(format!("accessor {index} of its values has the wrong type")));
         }

@@ -1,0 +1,76 @@
+//! What a pointer of `KHR_animation_pointer` means: nodes, meshes, materials, lights and cameras, by their places in
+//! the file. In: the pointer. Out: what channels change, or nothing where that cannot be animated.
+
+use super::super::json::{Fault, Item};
+use super::{Reader, Targets};
+use crate::animation::{ChannelPath, Property};
+use crate::assets::{Camera, Light, Material};
+use crate::ids::MaterialId;
+
+const LIGHTS: &str = "/extensions/KHR_lights_punctual/lights/";
+
+impl Reader<'_> {
+    /// `None`: it cannot be animated. None in the list: nothing in the scene has it.
+    pub(super) fn pointed_at(&self, pointer: &str) -> Result<Option<Targets>, Fault> {
+        if let Some((node, rest)) = split(pointer, "/nodes/") {
+            let path = match rest {
+                "translation" => ChannelPath::Translation,
+                "rotation" => ChannelPath::Rotation,
+                "scale" => ChannelPath::Scale,
+                "weights" => ChannelPath::Weights,
+                "extensions/KHR_node_visibility/visible" => ChannelPath::Visibility,
+                _ => return Ok(None),
+            };
+            let is_there = self.nodes.get(node).is_some();
+            let parts = is_there.then(|| self.parts(path, |index, _| Ok(index == node)));
+            return parts.transpose();
+        }
+        if let Some((mesh, "weights")) = split(pointer, "/meshes/") {
+            return self
+                .parts(ChannelPath::Weights, |_, node| Ok(node.size("mesh")? == Some(mesh)))
+                .map(Some);
+        }
+        if let Some((material, rest)) = split(pointer, "/materials/") {
+            let property = Property::find::<Material>(rest).filter(|_| material < self.materials.len());
+            let id = MaterialId(material as u64);
+            return Ok(property.map(|property| vec![(0, ChannelPath::Material(id, property))]));
+        }
+        if let Some((light, rest)) = split(pointer, LIGHTS) {
+            let Some(property) = Property::find::<Light>(rest) else { return Ok(None) };
+            let is_it = |node: &Item<'_>| match node.extension("KHR_lights_punctual")? {
+                Some(extension) => Ok(extension.size("light")? == Some(light)),
+                None => Ok(false),
+            };
+            return self.parts(ChannelPath::Light(property), |_, node| is_it(node)).map(Some);
+        }
+        if let Some((camera, rest)) = split(pointer, "/cameras/") {
+            let Some(property) = Property::find::<Camera>(rest) else { return Ok(None) };
+            let is_it = |node: &Item<'_>| Ok(node.size("camera")? == Some(camera));
+            return self.parts(ChannelPath::Camera(property), |_, node| is_it(node)).map(Some);
+        }
+        Ok(None)
+    }
+
+    /// The parts of the scene whose nodes are wanted, each with the path.
+    fn parts(
+        &self,
+        path: ChannelPath,
+        is_wanted: impl Fn(usize, &Item<'_>) -> Result<bool, Fault>,
+    ) -> Result<Targets, Fault> {
+        let mut targets = Targets::new();
+        for (index, (node, part)) in self.nodes.iter().zip(&self.tree.part_of_node).enumerate() {
+            if let Some(part) = part
+                && is_wanted(index, node)?
+            {
+                targets.push((*part, path));
+            }
+        }
+        Ok(targets)
+    }
+}
+
+/// The number behind a prefix, and what follows it.
+fn split<'a>(pointer: &'a str, prefix: &str) -> Option<(usize, &'a str)> {
+    let (number, rest) = pointer.strip_prefix(prefix)?.split_once('/')?;
+    Some((number.parse().ok()?, rest))
+}

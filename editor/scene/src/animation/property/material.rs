@@ -40,35 +40,81 @@ impl Animated for Material {
                 AlphaMode::Mask { cutoff } => one(cutoff),
                 AlphaMode::Opaque | AlphaMode::Blend => None,
             }),
-            row("extensions/KHR_materials_emissive_strength/emissiveStrength", RADIANCE, |material| one(&mut material.emissive_strength)),
+            row("extensions/KHR_materials_emissive_strength/emissiveStrength", RADIANCE, |material| {
+                one(&mut material.emissive_strength)
+            }),
             row("extensions/KHR_materials_ior/ior", INDEX, |material| one(&mut material.ior)),
-            row("extensions/KHR_materials_specular/specularFactor", UNIT, |material| one(&mut material.specular)),
-            row("extensions/KHR_materials_specular/specularColorFactor", POSITIVE, |material| three(&mut material.specular_color)),
-            row("extensions/KHR_materials_transmission/transmissionFactor", UNIT, |material| one(&mut material.transmission)),
-            row("extensions/KHR_materials_volume/thicknessFactor", POSITIVE, |material| one(&mut material.thickness_m)),
-            row("extensions/KHR_materials_volume/attenuationColor", UNIT, |material| three(&mut material.attenuation_color)),
-            row("extensions/KHR_materials_volume/attenuationDistance", ABOVE_ZERO, |material| one(material.attenuation_distance_m.get_or_insert(1.0))),
-            row("extensions/KHR_materials_dispersion/dispersion", POSITIVE, |material| one(&mut material.dispersion)),
-            row("extensions/KHR_materials_anisotropy/anisotropyStrength", UNIT, |material| one(&mut material.anisotropy.get_or_insert_default().strength)),
-            row("extensions/KHR_materials_anisotropy/anisotropyRotation", ANY, |material| one(&mut material.anisotropy.get_or_insert_default().rotation_rad)),
-            row("extensions/KHR_materials_clearcoat/clearcoatFactor", UNIT, |material| one(&mut material.clearcoat.get_or_insert_default().factor)),
-            row("extensions/KHR_materials_clearcoat/clearcoatRoughnessFactor", UNIT, |material| one(&mut material.clearcoat.get_or_insert_default().roughness)),
-            row("extensions/KHR_materials_clearcoat/clearcoatNormalTexture/scale", ANY, |material| one(&mut material.clearcoat.get_or_insert_default().normal_scale)),
-            row("extensions/KHR_materials_iridescence/iridescenceFactor", UNIT, |material| one(&mut material.iridescence.get_or_insert_default().factor)),
-            row("extensions/KHR_materials_iridescence/iridescenceIor", INDEX, |material| one(&mut material.iridescence.get_or_insert_default().ior)),
-            row("extensions/KHR_materials_iridescence/iridescenceThicknessMinimum", POSITIVE, |material| one(&mut material.iridescence.get_or_insert_default().thickness_min_nm)),
-            row("extensions/KHR_materials_iridescence/iridescenceThicknessMaximum", POSITIVE, |material| one(&mut material.iridescence.get_or_insert_default().thickness_max_nm)),
-            row("extensions/KHR_materials_sheen/sheenColorFactor", UNIT, |material| three(&mut material.sheen.get_or_insert_default().color)),
-            row("extensions/KHR_materials_sheen/sheenRoughnessFactor", UNIT, |material| one(&mut material.sheen.get_or_insert_default().roughness)),
-            row("extensions/KHR_materials_diffuse_transmission/diffuseTransmissionFactor", UNIT, |material| one(&mut material.diffuse_transmission.get_or_insert_default().factor)),
-            row("extensions/KHR_materials_diffuse_transmission/diffuseTransmissionColorFactor", UNIT, |material| three(&mut material.diffuse_transmission.get_or_insert_default().color)),
+            row("extensions/KHR_materials_specular/specularFactor", UNIT, |material| {
+                one(&mut material.specular)
+            }),
+            row("extensions/KHR_materials_specular/specularColorFactor", POSITIVE, |material| {
+                three(&mut material.specular_color)
+            }),
+            row("extensions/KHR_materials_transmission/transmissionFactor", UNIT, |material| {
+                one(&mut material.transmission)
+            }),
+            row("extensions/KHR_materials_volume/thicknessFactor", POSITIVE, |material| {
+                one(&mut material.thickness_m)
+            }),
+            row("extensions/KHR_materials_volume/attenuationColor", UNIT, |material| {
+                three(&mut material.attenuation_color)
+            }),
+            row("extensions/KHR_materials_volume/attenuationDistance", ABOVE_ZERO, |material| {
+                one(material.attenuation_distance_m.get_or_insert(1.0))
+            }),
+            row("extensions/KHR_materials_dispersion/dispersion", POSITIVE, |material| {
+                one(&mut material.dispersion)
+            }),
+            row("extensions/KHR_materials_anisotropy/anisotropyStrength", UNIT, |material| {
+                one(&mut material.anisotropy.get_or_insert_default().strength)
+            }),
+            row("extensions/KHR_materials_anisotropy/anisotropyRotation", ANY, |material| {
+                one(&mut material.anisotropy.get_or_insert_default().rotation_rad)
+            }),
+            row("extensions/KHR_materials_clearcoat/clearcoatFactor", UNIT, |material| {
+                one(&mut material.clearcoat.get_or_insert_default().factor)
+            }),
+            row("extensions/KHR_materials_clearcoat/clearcoatRoughnessFactor", UNIT, |material| {
+                one(&mut material.clearcoat.get_or_insert_default().roughness)
+            }),
+            row("extensions/KHR_materials_clearcoat/clearcoatNormalTexture/scale", ANY, |material| {
+                one(&mut material.clearcoat.get_or_insert_default().normal_scale)
+            }),
+            row("extensions/KHR_materials_iridescence/iridescenceFactor", UNIT, |material| {
+                one(&mut material.iridescence.get_or_insert_default().factor)
+            }),
+            row("extensions/KHR_materials_iridescence/iridescenceIor", INDEX, |material| {
+                one(&mut material.iridescence.get_or_insert_default().ior)
+            }),
+            row("extensions/KHR_materials_iridescence/iridescenceThicknessMinimum", POSITIVE, |material| {
+                one(&mut material.iridescence.get_or_insert_default().thickness_min_nm)
+            }),
+            row("extensions/KHR_materials_iridescence/iridescenceThicknessMaximum", POSITIVE, |material| {
+                one(&mut material.iridescence.get_or_insert_default().thickness_max_nm)
+            }),
+            row("extensions/KHR_materials_sheen/sheenColorFactor", UNIT, |material| {
+                three(&mut material.sheen.get_or_insert_default().color)
+            }),
+            row("extensions/KHR_materials_sheen/sheenRoughnessFactor", UNIT, |material| {
+                one(&mut material.sheen.get_or_insert_default().roughness)
+            }),
+            row("extensions/KHR_materials_diffuse_transmission/diffuseTransmissionFactor", UNIT, |material| {
+                one(&mut material.diffuse_transmission.get_or_insert_default().factor)
+            }),
+            row("extensions/KHR_materials_diffuse_transmission/diffuseTransmissionColorFactor", UNIT, |material| {
+                three(&mut material.diffuse_transmission.get_or_insert_default().color)
+            }),
             // The base colour is the diffuse colour of this model.
             row("extensions/KHR_materials_pbrSpecularGlossiness/diffuseFactor", POSITIVE, |material| {
                 material.specular_glossiness.as_ref()?;
                 four(&mut material.base_color)
             }),
-            row("extensions/KHR_materials_pbrSpecularGlossiness/specularFactor", UNIT, |material| three(&mut material.specular_glossiness.as_mut()?.specular)),
-            row("extensions/KHR_materials_pbrSpecularGlossiness/glossinessFactor", UNIT, |material| one(&mut material.specular_glossiness.as_mut()?.glossiness)),
+            row("extensions/KHR_materials_pbrSpecularGlossiness/specularFactor", UNIT, |material| {
+                three(&mut material.specular_glossiness.as_mut()?.specular)
+            }),
+            row("extensions/KHR_materials_pbrSpecularGlossiness/glossinessFactor", UNIT, |material| {
+                one(&mut material.specular_glossiness.as_mut()?.glossiness)
+            }),
         ]
         "pbrMetallicRoughness/baseColorTexture": |material| material.base_color_texture;
         "pbrMetallicRoughness/metallicRoughnessTexture": |material| material.metallic_roughness_texture;

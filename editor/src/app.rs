@@ -19,6 +19,7 @@ mod dispatch;
 pub mod editor;
 mod export;
 mod files;
+mod recovery;
 mod window;
 
 /// What the command line says.
@@ -74,10 +75,10 @@ impl App {
 
     /// Ends the program with an error.
     fn fail(&mut self, event_loop: &ActiveEventLoop, error: anyhow::Error) {
-        let rescued = self.window.as_ref().and_then(window::EditorWindow::rescue);
-        self.failure = Some(match rescued {
-            Some(path) => error.context(format!("the unsaved changes were written to {}", path.display())),
-            None => error,
+        let kept = self.window.as_ref().is_some_and(window::EditorWindow::keeps_changes);
+        self.failure = Some(match kept {
+            true => error.context("the unsaved changes are kept; start the editor again to recover them"),
+            false => error,
         });
         self.window = None;
         event_loop.exit();

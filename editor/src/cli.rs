@@ -20,10 +20,12 @@ use std::sync::Arc;
 use caustica_renderer::RendererError;
 use caustica_renderer::gpu::{Device, DeviceOptions, GpuError, Instance, InstanceOptions, Requirements};
 use caustica_scene::import::Warning;
-use caustica_scene::{Document, Local, ShapeSource};
+use caustica_scene::{Document, Local, Project, ShapeSource};
 use clap::{Args, Parser, Subcommand};
 
+use crate::recovery;
 use crate::session::{Loaded, load};
+use crate::ui_state::Config;
 
 /// Scene editor with a hybrid Vulkan ray-tracing renderer. Without a subcommand the editor opens.
 #[derive(Parser, Debug)]
@@ -81,6 +83,29 @@ impl DeviceArgs {
     }
 }
 
+/// Which files of a project are read.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub(crate) struct SourceArgs {
+    /// Read also what a project names outside of its folder (else only for projects that were saved here)
+    #[arg(long)]
+    outside: bool,
+}
+
+impl SourceArgs {
+    /// Reads a file; says so when unsaved changes of it were left behind.
+    fn load(self, file: &Path, progress: &dyn Fn(&str, f32)) -> anyhow::Result<Loaded> {
+        let is_project = Project::is_project_path(file);
+        let outside = self.outside || is_project && Config::load().trusts(file);
+        let loaded = load(file, outside, progress)?;
+        if is_project {
+            for words in recovery::unsaved_changes_of(file) {
+                tracing::warn!("{words}");
+            }
+        }
+        Ok(loaded)
+    }
+}
+
 /// The input is at fault.
 const EXIT_INPUT: u8 = 1;
 /// Wrong usage.
@@ -133,9 +158,9 @@ fn demo_project() -> Option<PathBuf> {
 }
 
 /// The scene of a file, with what was left out or repaired on reading.
-fn document_of(file: &Path) -> anyhow::Result<(Document, Vec<Warning>)> {
+fn document_of(file: &Path, sources: SourceArgs) -> anyhow::Result<(Document, Vec<Warning>)> {
     let mut document = Document::new();
-    let warnings = match load(file, &|_, _| {})? {
+    let warnings = match sources.load(file, &|_, _| {})? {
         Loaded::Project(project) => return Ok((project.document, project.warnings)),
         Loaded::Model(imported) => {
             let warnings = imported.warnings.clone();

@@ -134,6 +134,11 @@ impl History {
         self.saved_state = Some(self.state());
     }
 
+    /// No file holds the present state, nor any that can be undone to.
+    pub fn mark_unsaved(&mut self) {
+        self.saved_state = None;
+    }
+
     /// Whether the present state is what the file holds; undoing back to it counts.
     pub fn is_saved(&self) -> bool {
         self.saved_state == Some(self.state())

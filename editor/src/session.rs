@@ -18,7 +18,7 @@ use caustica_renderer::gpu::{Device, Frames};
 use caustica_renderer::{
     AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings,
 };
-use caustica_scene::{Document, Edit, EditError, Local, NodeId, PrefabId, ProjectMeta, ShapeSource, Target};
+use caustica_scene::{Document, Edit, EditError, Local, NodeId, PrefabId, Recovered, ShapeSource, Target};
 use glam::DVec3;
 
 pub use camera::ViewCamera;
@@ -26,7 +26,9 @@ pub use files::{Loaded, environment_argument, load};
 pub use host_times::{HostTimes, Lap};
 pub use tally::Tally;
 
+use self::files::Opened;
 use crate::history::History;
+use crate::open_scene::OpenScene;
 use crate::sync::{Sync, instance_id};
 
 /// Device time of one submit while the window is open: input is answered in between.
@@ -60,11 +62,7 @@ pub struct Pick {
 
 /// A document, its history, its renderer and one view.
 pub struct Session {
-    /// Shared while a worker reads it: an edit in that time copies it first.
-    document: Arc<Document>,
-    history: History,
-    meta: ProjectMeta,
-    path: Option<PathBuf>,
+    scene: OpenScene,
     sync: Sync,
     renderer: Renderer,
     frames: Frames,
@@ -74,7 +72,6 @@ pub struct Session {
     selection_changed: bool,
     /// The renderer may hold half of a change: it gets the whole scene again.
     resync: bool,
-    picture_revision: u64,
     profile: ProfileInForce,
     tally: Tally,
     host_times: HostTimes,
@@ -102,10 +99,7 @@ impl Session {
             renderer.view_mut(view)?.set_submit_budget(Some(SUBMIT_BUDGET_MS));
         }
         Ok(Self {
-            document: Arc::default(),
-            history: History::new(),
-            meta: ProjectMeta::default(),
-            path: None,
+            scene: OpenScene::new(),
             sync: Sync::new(),
             renderer,
             frames,
@@ -114,7 +108,6 @@ impl Session {
             selection: BTreeSet::new(),
             selection_changed: false,
             resync: false,
-            picture_revision: 0,
             profile,
             tally: Tally::default(),
             host_times: HostTimes::default(),
@@ -134,34 +127,34 @@ impl Session {
 
     /// The document.
     pub fn document(&self) -> &Document {
-        &self.document
+        &self.scene.document
     }
 
     /// The document for a worker to read. What changes it meanwhile copies it first, and so does the next frame while it has
     /// changes that wait for that frame.
     pub fn shared_document(&self) -> Arc<Document> {
-        Arc::clone(&self.document)
+        Arc::clone(&self.scene.document)
     }
 
     /// Names of the lights, in order, with their ids in the renderer.
     pub fn light_names(&self) -> Vec<(LightId, String)> {
-        let named = |target| (instance_id(target), self.document.display_name(target));
-        self.document.lights().map(|light| named(light.target)).collect()
+        let named = |target| (instance_id(target), self.scene.document.display_name(target));
+        self.scene.document.lights().map(|light| named(light.target)).collect()
     }
 
     /// Undo and redo stacks.
     pub fn history(&self) -> &History {
-        &self.history
+        &self.scene.history
     }
 
     /// Whether there is anything that was not saved.
     pub fn is_modified(&self) -> bool {
-        !self.history.is_saved()
+        !self.scene.history.is_saved()
     }
 
     /// The project file, once there is one.
     pub fn path(&self) -> Option<&Path> {
-        self.path.as_deref()
+        self.scene.path.as_deref()
     }
 
     /// Applies an edit and notes how to undo it. Edits of one gesture become one step.
@@ -169,23 +162,12 @@ impl Session {
     /// # Errors
     /// When the edit does not fit the document or touches what is locked; the document stays as it was.
     pub fn push(&mut self, edit: Edit) -> Result<(), EditError> {
-        if let Some(lock) = self.document.locked_against(&edit) {
-            return Err(EditError::Locked(self.document.display_name(lock.into())));
-        }
-        let label = edit.describe(&self.document);
-        self.note_picture(&edit);
-        let inverse = Arc::make_mut(&mut self.document).apply(edit.clone())?;
-        self.history.record(label, edit, inverse);
-        Ok(())
-    }
-
-    fn note_picture(&mut self, edit: &Edit) {
-        self.picture_revision += u64::from(edit.changes_picture());
+        self.scene.push(edit)
     }
 
     /// Grows with every edit, undo and redo that may change the picture.
     pub fn picture_revision(&self) -> u64 {
-        self.picture_revision
+        self.scene.picture_revision
     }
 
     /// Lets the document make an edit (which may take new ids) and applies it.
@@ -193,9 +175,7 @@ impl Session {
     /// # Errors
     /// When the edit does not fit the document, which stays as it was.
     pub fn edit_with<T>(&mut self, make: impl FnOnce(&mut Document) -> (T, Edit)) -> Result<T, EditError> {
-        let (value, edit) = make(Arc::make_mut(&mut self.document));
-        self.push(edit)?;
-        Ok(value)
+        self.scene.edit_with(make)
     }
 
     /// Adds spheres and boxes with materials of their own, as one step; gives the new node.
@@ -203,46 +183,39 @@ impl Session {
     /// # Errors
     /// When the description makes no shapes.
     pub fn add_shapes(&mut self, name: &str, source: ShapeSource, local: Local) -> Result<NodeId, EditError> {
-        let (node, edit) = files::shapes_edit(Arc::make_mut(&mut self.document), name, source, local)?;
+        let (node, edit) = files::shapes_edit(Arc::make_mut(&mut self.scene.document), name, source, local)?;
         self.push(edit)?;
         Ok(node)
     }
 
     /// Ends a gesture: the next edit starts a step of its own.
     pub fn end_gesture(&mut self) {
-        self.history.end_gesture();
+        self.scene.end_gesture();
     }
 
     /// Takes the open gesture back, as Esc does in a drag.
     pub fn cancel_gesture(&mut self) {
-        if let Some(step) = self.history.cancel_gesture() {
-            self.note_picture(&step.edit);
-            if let Err(error) = Arc::make_mut(&mut self.document).apply_back(step.edit) {
-                tracing::error!("taking a gesture back failed: {error}");
-            }
-        }
+        self.scene.cancel_gesture();
     }
 
     /// Undoes the newest step; says what was undone.
     pub fn undo(&mut self) -> Option<String> {
-        let step = self.history.take_undo()?;
-        self.note_picture(&step.edit);
-        match Arc::make_mut(&mut self.document).apply_back(step.edit.clone()) {
-            Ok(redo) => self.history.put_redo(&step, redo),
-            Err(error) => tracing::error!("undo of '{}' failed: {error}", step.label),
-        }
-        Some(step.label)
+        self.scene.undo()
     }
 
     /// Does the step undone last again; says what was done.
     pub fn redo(&mut self) -> Option<String> {
-        let step = self.history.take_redo()?;
-        self.note_picture(&step.edit);
-        match Arc::make_mut(&mut self.document).apply_back(step.edit.clone()) {
-            Ok(undo) => self.history.put_undo(&step, undo),
-            Err(error) => tracing::error!("redo of '{}' failed: {error}", step.label),
-        }
-        Some(step.label)
+        self.scene.redo()
+    }
+
+    /// The document with its history and its journal.
+    pub fn scene(&self) -> &OpenScene {
+        &self.scene
+    }
+
+    /// The document with its history and its journal.
+    pub fn scene_mut(&mut self) -> &mut OpenScene {
+        &mut self.scene
     }
 
     /// Replaces the document with what was loaded. The history starts anew.
@@ -260,40 +233,70 @@ impl Session {
     /// As [`Self::open`].
     pub fn open_at(&mut self, path: &Path, loaded: Loaded, time_s: Option<f64>) -> anyhow::Result<()> {
         let opened = files::open(path, loaded)?;
-        room::check(&opened.document, self.device.memory_budget())?;
-        self.meta = opened.meta;
-        self.path = opened.path;
-        self.replace_scene(opened.document, "opened a file")?;
-        if let Some(settings) = opened.settings {
+        let document = match &opened {
+            Opened::Project(_, project) => &project.document,
+            Opened::Unsaved(document) => document,
+        };
+        room::check(document, self.device.memory_budget())?;
+        self.empty_renderer()?;
+        match opened {
+            Opened::Project(path, project) => self.scene.open(path, *project),
+            Opened::Unsaved(document) => self.scene.open_unsaved(*document),
+        }
+        self.show_opened(time_s);
+        Ok(())
+    }
+
+    /// Replaces the document with one that was recovered, in the view of its project. Its steps since the last save can be
+    /// undone.
+    ///
+    /// # Errors
+    /// When the driver refuses; the open document stays as it was.
+    pub fn recover(&mut self, recovered: Recovered) -> anyhow::Result<()> {
+        self.empty_renderer()?;
+        self.scene.recover(recovered);
+        self.show_opened(None);
+        Ok(())
+    }
+
+    /// Looks at another document as its project says; else by its own camera, or at the whole of it.
+    fn show_opened(&mut self, time_s: Option<f64>) {
+        self.forget_selection();
+        let (camera, settings) = files::noted_view(&self.scene.meta);
+        if let Some(settings) = settings {
             self.set_settings(settings);
         }
         self.camera =
-            opened.camera.unwrap_or_else(|| ViewCamera::of_document(&self.document, None, self.aspect()));
+            camera.unwrap_or_else(|| ViewCamera::of_document(&self.scene.document, None, self.aspect()));
         self.set_time(time_s);
-        if opened.camera.is_none()
-            && let Some(camera) = self.document.main_camera()
+        if camera.is_none()
+            && let Some(camera) = self.scene.document.main_camera()
         {
             self.camera = ViewCamera::of_placed(&camera);
         }
-        Ok(())
+    }
+
+    fn forget_selection(&mut self) {
+        self.selection.clear();
+        self.selection_changed = true;
     }
 
     /// Shows the scene at a time, seconds; `None`: at rest. It is no edit: history and file know nothing of it.
     pub fn set_time(&mut self, time_s: Option<f64>) {
-        if self.document.time() != time_s {
-            Arc::make_mut(&mut self.document).set_time(time_s);
-            self.picture_revision += 1;
+        if self.scene.document.time() != time_s {
+            Arc::make_mut(&mut self.scene.document).set_time(time_s);
+            self.scene.picture_revision += 1;
         }
     }
 
     /// The time that is shown, seconds; `None`: everything is at rest.
     pub fn time(&self) -> Option<f64> {
-        self.document.time()
+        self.scene.document.time()
     }
 
     /// How long the longest clip lasts that an instance plays, seconds; `None`: nothing is animated.
     pub fn duration(&self) -> Option<f64> {
-        self.document.animation_duration()
+        self.scene.document.animation_duration()
     }
 
     /// Starts an empty document.
@@ -301,22 +304,12 @@ impl Session {
     /// # Errors
     /// When the driver refuses.
     pub fn new_document(&mut self) -> anyhow::Result<()> {
-        self.meta = ProjectMeta::default();
-        self.path = None;
-        self.replace_scene(Document::new(), "new scene")?;
-        self.camera = ViewCamera::default();
-        Ok(())
-    }
-
-    /// Empties the renderer's scene before another document is synced.
-    fn replace_scene(&mut self, mut document: Document, reason: &str) -> anyhow::Result<()> {
-        document.mark_all_added(reason);
-        self.document = Arc::new(document);
+        let mut document = Document::new();
+        document.mark_all_added("new scene");
         self.empty_renderer()?;
-        self.picture_revision += 1;
-        self.history.clear();
-        self.selection.clear();
-        self.selection_changed = true;
+        self.scene.open_unsaved(document);
+        self.forget_selection();
+        self.camera = ViewCamera::default();
         Ok(())
     }
 
@@ -326,15 +319,15 @@ impl Session {
     /// # Errors
     /// When the edit does not fit, or the scene with it on the device; the document stays as it was.
     pub fn import(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<Option<NodeId>> {
-        let was_empty = self.document.node_count() == 0;
-        let node = files::import(Arc::make_mut(&mut self.document), path, loaded)?;
+        let was_empty = self.scene.document.node_count() == 0;
+        let node = files::import(Arc::make_mut(&mut self.scene.document), path, loaded)?;
         let (edit, node) = (node.edit, node.node);
-        let mut with_it = Document::clone(&self.document);
+        let mut with_it = Document::clone(&self.scene.document);
         with_it.apply(edit.clone())?;
         room::check(&with_it, self.device.memory_budget())?;
         self.push(edit)?;
         if was_empty {
-            self.camera = ViewCamera::of_document(&self.document, None, self.aspect());
+            self.camera = ViewCamera::of_document(&self.scene.document, None, self.aspect());
         }
         Ok(node)
     }
@@ -344,7 +337,7 @@ impl Session {
     /// # Errors
     /// When the node is no instance, or shares its prefab with none.
     pub fn make_unique(&mut self, node: NodeId) -> Result<(), EditError> {
-        let edit = Arc::make_mut(&mut self.document).make_unique_edit(node)?;
+        let edit = Arc::make_mut(&mut self.scene.document).make_unique_edit(node)?;
         self.push(edit)
     }
 
@@ -356,7 +349,7 @@ impl Session {
         let Loaded::Model(imported) = loaded else {
             anyhow::bail!("only a model (.gltf, .glb, .obj) can be the source of an instance")
         };
-        let edit = Arc::make_mut(&mut self.document).reload_edit(prefab, *imported)?;
+        let edit = Arc::make_mut(&mut self.scene.document).reload_edit(prefab, *imported)?;
         Ok(self.push(edit)?)
     }
 
@@ -366,11 +359,8 @@ impl Session {
     /// When the file cannot be written; the old one stays.
     pub fn save(&mut self, path: &Path) -> anyhow::Result<()> {
         let settings = self.settings().clone();
-        files::note_view(&mut self.meta, &self.camera, &settings);
-        caustica_scene::Project::save(path, &self.document, &self.meta)?;
-        self.path = Some(path.to_owned());
-        self.history.mark_saved();
-        Ok(())
+        files::note_view(&mut self.scene.meta, &self.camera, &settings);
+        Ok(self.scene.save(path)?)
     }
 
     /// Width / height of the view.

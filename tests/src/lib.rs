@@ -4,6 +4,7 @@
 
 pub mod compute;
 pub mod desktop;
+pub mod edits;
 pub mod gpu;
 pub mod models;
 pub mod numbers;

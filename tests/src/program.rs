@@ -46,16 +46,18 @@ pub struct Run {
     pub stderr: String,
 }
 
-/// Runs the program in `folder` without a display, and without what the user has configured: its configuration is the
-/// folder `config` in there.
+/// Runs the program in `folder` without a display, and without what the user has configured or left unsaved: that is in the
+/// folders `config` and `data` in there.
 ///
 /// # Panics
 /// When it cannot be started, or when it panicked.
 pub fn caustica(folder: &Path, arguments: &[&str]) -> Run {
     let mut command = Command::new(program());
     command.current_dir(folder).args(arguments);
+    let own = std::path::absolute(folder).unwrap_or_default();
     command
-        .env("XDG_CONFIG_HOME", std::path::absolute(folder).unwrap_or_default().join("config"))
+        .env("XDG_CONFIG_HOME", own.join("config"))
+        .env("XDG_DATA_HOME", own.join("data"))
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY")
         .env_remove("CAUSTICA_LOG")

@@ -138,7 +138,7 @@ fn a_prefab_placed_again_takes_no_memory_and_a_unique_one_its_own() {
     let options = SessionOptions { settings, extent: [32, 32], ..SessionOptions::default() };
     let mut session = Session::new(&gpu.device, options).expect("a session");
     let path = caustica_tests::repository().join("projects/gallery/gallery.caustica.json");
-    session.open(&path, load(&path, &|_, _| {}).expect("the gallery")).expect("a scene");
+    session.open(&path, load(&path, false, &|_, _| {}).expect("the gallery")).expect("a scene");
     let vase = session.document().nodes().find(|(_, node)| node.name == "Painted vase").expect("the vase").0;
     let before = bytes_of(&mut session);
     for _ in 0..50 {

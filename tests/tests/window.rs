@@ -27,6 +27,17 @@ struct Editor<'a> {
 impl<'a> Editor<'a> {
     /// Opens a model and waits for its picture in a window of the size that the tests count with.
     fn open(desktop: &'a Desktop, folder: &Path, gltf: &str) -> Self {
+        let mut editor = Self::start(desktop, folder, gltf);
+        editor.wait_for("a picture in the resized window", 60, |desktop| {
+            let screen = desktop.screenshot();
+            let outside = screen.get_pixel(WINDOW[0] + 50, WINDOW[1] / 2).0;
+            (shows_cube(&screen) && outside == [0, 0, 0]).then_some(())
+        });
+        editor
+    }
+
+    /// Starts on a model, in a window of that size.
+    fn start(desktop: &'a Desktop, folder: &Path, gltf: &str) -> Self {
         let model = folder.join("cube.gltf");
         std::fs::write(&model, gltf).expect("a model on disk");
         let log_path = folder.join("log.txt");
@@ -44,13 +55,6 @@ impl<'a> Editor<'a> {
         editor.window = editor.wait_for("the window", 60, |desktop| desktop.window("Caustica"));
         desktop.xdotool(&format!("windowsize {} {} {}", editor.window, WINDOW[0], WINDOW[1]));
         desktop.xdotool(&format!("windowfocus {}", editor.window));
-        editor.wait_for("a picture in the resized window", 60, |desktop| {
-            let screen = desktop.screenshot();
-            let outside = screen.get_pixel(WINDOW[0] + 50, WINDOW[1] / 2).0;
-            // The cube in the middle of the view is brighter than the panels around it.
-            let bright = screen.get_pixel(MIDDLE[0], MIDDLE[1]).0.iter().all(|c| *c > 60);
-            (bright && outside == [0, 0, 0]).then_some(())
-        });
         editor
     }
 
@@ -91,6 +95,11 @@ impl Drop for Editor<'_> {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
+}
+
+/// The cube in the middle of the view is brighter than the panels around it.
+fn shows_cube(screen: &RgbImage) -> bool {
+    screen.get_pixel(MIDDLE[0], MIDDLE[1]).0.iter().all(|c| *c > 60)
 }
 
 /// A box of pixels: left, top, right, bottom.
@@ -240,4 +249,38 @@ fn an_animation_plays_and_leaves_the_document_alone() {
     });
     assert!(!editor.log().contains("undone"), "{}", editor.log());
     editor.quit();
+}
+
+#[test]
+fn what_a_killed_editor_had_not_saved_is_recovered() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let desktop = Desktop::start([1600, 960]);
+    let mut editor = Editor::open(&desktop, folder.path(), &cube(false));
+    desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", MIDDLE[0], MIDDLE[1]));
+    editor.wait_for("the outline of the cube", 30, |desktop| outline(&desktop.screenshot()));
+    desktop.xdotool("key Delete");
+    let window = editor.window.clone();
+    let is_modified = move |desktop: &Desktop| {
+        desktop.xdotool(&format!("getwindowname {window}")).contains('\u{2022}').then_some(())
+    };
+    editor.wait_for("the cube to go", 30, is_modified);
+    editor.process.kill().expect("a signal that nothing can catch");
+    editor.process.wait().expect("the end");
+    drop(editor);
+
+    let mut again = Editor::start(&desktop, folder.path(), &cube(false));
+    let log = again.log.clone();
+    let asks = |_: &Desktop| std::fs::read_to_string(&log).ok()?.contains("left behind").then_some(());
+    again.wait_for("the question", 60, asks);
+    let window = again.window.clone();
+    again.wait_for("Enter to say: recover", 60, |desktop| {
+        desktop.xdotool("key Return sleep 0.5");
+        desktop.xdotool(&format!("getwindowname {window}")).contains('\u{2022}').then_some(())
+    });
+    assert!(!shows_cube(&settled(&mut again)), "it was deleted");
+    // What was done before the end can be undone after it.
+    desktop.xdotool("key ctrl+z");
+    again.wait_for("undo to bring the cube back", 30, |desktop| {
+        shows_cube(&desktop.screenshot()).then_some(())
+    });
 }

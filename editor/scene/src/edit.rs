@@ -2,6 +2,7 @@
 //! returns the edit that undoes it. This file knows what an edit says, not how it is carried out.
 
 use glam::DAffine3;
+use serde::{Deserialize, Serialize};
 
 use crate::animation::ClipChoice;
 use crate::assets::{Camera, Environment, Light, Material, Mesh, ShapeFault, ShapeSource};
@@ -11,8 +12,9 @@ use crate::node::Subtree;
 use crate::package::{MaterialEntry, PrefabPackage};
 use crate::transform::Local;
 
-/// A change of the document.
-#[derive(Clone, Debug, PartialEq)]
+/// A change of the document. The journal writes it as JSON, with files named and not written out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
 pub enum Edit {
     /// Moves a node, or a part inside an instance (which becomes an override).
     SetTransform {
@@ -207,7 +209,8 @@ pub enum Edit {
 }
 
 /// In which respect a part can differ from its prefab.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub enum OverrideField {
     /// Its name.
     Name,

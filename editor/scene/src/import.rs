@@ -22,6 +22,7 @@ mod uri;
 pub use environment::load_environment;
 pub use error::{ImportError, Warning};
 pub use shapes::load_shapes;
+pub(crate) use uri::{is_address, leads_out};
 
 /// What an import may be told.
 #[derive(Clone, Debug)]
@@ -30,11 +31,13 @@ pub struct ImportOptions {
     pub max_image_extent_px: u32,
     /// Most vertices and triangles that one file may bring.
     pub max_elements: usize,
+    /// Reads what a project names outside of its own folder, which is left out otherwise.
+    pub outside_project: bool,
 }
 
 impl Default for ImportOptions {
     fn default() -> Self {
-        Self { max_image_extent_px: 16_384, max_elements: 400_000_000 }
+        Self { max_image_extent_px: 16_384, max_elements: 400_000_000, outside_project: false }
     }
 }
 

@@ -35,5 +35,8 @@ pub use ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
 pub use node::{Node, NodeKind, RayVisibility, Subtree};
 pub use package::{MaterialEntry, PrefabPackage};
 pub use prefab::{PartNode, PartOrderError, PartOverride, PartPath, Prefab, Skin};
-pub use project::{Project, ProjectError, ProjectMeta, ProjectProblem, SCHEMA_VERSION};
+pub use project::{
+    Fingerprint, Journal, JournalError, LeftBehind, Project, ProjectError, ProjectMeta, ProjectProblem,
+    Recovered, RecoveredStep, SCHEMA_VERSION,
+};
 pub use transform::{Local, Trs, is_degenerate, rigid};

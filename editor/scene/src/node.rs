@@ -9,6 +9,7 @@ use crate::animation::ClipChoice;
 use crate::assets::{Camera, Light};
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId};
 use crate::prefab::{PartOverride, PartPath};
+use crate::project::NodeRecord;
 use crate::transform::Local;
 
 /// One node of the document.
@@ -119,7 +120,8 @@ impl Node {
 }
 
 /// A node with everything below it, as a value: what adding needs and removing gives back.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Vec<NodeRecord>", into = "Vec<NodeRecord>")]
 pub struct Subtree {
     /// The first entry is the top; parents come before their children.
     pub nodes: Vec<(NodeId, Node)>,

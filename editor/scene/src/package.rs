@@ -3,6 +3,8 @@
 
 use std::collections::BTreeSet;
 
+use serde::{Deserialize, Serialize};
+
 use crate::assets::{Material, Mesh, Texture};
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
@@ -10,10 +12,11 @@ use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, TextureId};
 use crate::import::Imported;
 use crate::node::{Node, NodeKind, Subtree};
 use crate::prefab::Prefab;
+use crate::project::PackageRecord;
 use crate::transform::Local;
 
 /// A material with what its source says.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MaterialEntry {
     /// What it is now.
     pub value: Material,
@@ -21,8 +24,10 @@ pub struct MaterialEntry {
     pub original: Option<Material>,
 }
 
-/// A prefab with its assets.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// A prefab with its assets. Written as JSON it is named by its source, with ids and edits; what is read of that is a
+/// placeholder until the source is imported.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "PackageRecord", into = "PackageRecord")]
 pub struct PrefabPackage {
     /// Id of the prefab.
     pub id: PrefabId,
@@ -107,6 +112,36 @@ pub(crate) fn package_with_ids(
     package(id, imported, &ids)
 }
 
+impl PrefabPackage {
+    /// Materials that were edited stay as they were edited, primitives that were moved stay moved. Of another file, that holds
+    /// for materials of the same name and meshes with as many primitives.
+    pub(crate) fn keep_edits<'a>(
+        &mut self,
+        same_file: bool,
+        old_material: impl Fn(MaterialId) -> Option<&'a MaterialEntry>,
+        old_mesh: impl Fn(MeshId) -> Option<&'a Mesh>,
+    ) {
+        for (id, entry) in &mut self.materials {
+            let Some(old) = old_material(*id).filter(|old| old.original.as_ref() != Some(&old.value)) else {
+                continue;
+            };
+            if same_file || old.original.as_ref().is_some_and(|before| before.name == entry.value.name) {
+                entry.value = old.value.clone();
+            }
+        }
+        for (id, mesh) in &mut self.meshes {
+            let old = old_mesh(*id).map_or(&[][..], |old| &old.primitives);
+            if !same_file && old.len() != mesh.primitives.len() {
+                continue;
+            }
+            for (primitive, old) in mesh.primitives.iter_mut().zip(old) {
+                primitive.mesh_from_primitive = old.mesh_from_primitive;
+            }
+            mesh.update_bounds();
+        }
+    }
+}
+
 impl Document {
     /// Gives an imported file ids and returns the edit that adds it as a prefab, without an instance.
     pub fn import_edit(&mut self, imported: Imported) -> (PrefabId, Edit) {
@@ -156,24 +191,7 @@ impl Document {
         let (meshes, materials, textures) = (old.meshes.clone(), old.materials.clone(), old.textures.clone());
         let ids = (&meshes[..], &materials[..], &textures[..]);
         let mut package = package_with_ids(self, id, imported, ids);
-        for (material, entry) in &mut package.materials {
-            if let Some(now) = self.material_entry(*material)
-                && now.original.as_ref() != Some(&now.value)
-                && (same_file || now.original.as_ref().is_some_and(|before| before.name == entry.value.name))
-            {
-                entry.value = now.value.clone();
-            }
-        }
-        for (id, mesh) in &mut package.meshes {
-            let old = self.mesh(*id).map_or(&[][..], |old| &old.primitives);
-            if !same_file && old.len() != mesh.primitives.len() {
-                continue;
-            }
-            for (primitive, old) in mesh.primitives.iter_mut().zip(old) {
-                primitive.mesh_from_primitive = old.mesh_from_primitive;
-            }
-            mesh.update_bounds();
-        }
+        package.keep_edits(same_file, |id| self.material_entry(id), |id| self.mesh(id));
         Ok(Edit::ReplacePrefab(Box::new(package)))
     }
 

@@ -5,22 +5,28 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::document::Document;
 use crate::import::{ImportOptions, Warning};
 
 pub(crate) mod atomic;
+mod journal;
+mod migrate;
 mod paths;
 mod read;
 mod record;
 mod write;
 
+pub use journal::{Journal, JournalError, LeftBehind, Recovered, RecoveredStep};
+pub(crate) use record::{EnvironmentRecord, LocalRecord, NodeRecord, PackageRecord};
+
 /// Version of the format that is written, and the newest that is read. 2: meshes of spheres and boxes.
 pub const SCHEMA_VERSION: u64 = 2;
 
 /// A project that was read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Project {
     /// The scene.
     pub document: Document,
@@ -28,6 +34,23 @@ pub struct Project {
     pub meta: ProjectMeta,
     /// What is missing or was repaired.
     pub warnings: Vec<Warning>,
+    /// Files outside of its folder that it names and that were not read ([`ImportOptions::outside_project`]).
+    pub outside: Vec<PathBuf>,
+    /// What the file was when it was read.
+    pub file: Fingerprint,
+}
+
+/// Tells the states of a file apart: its length and the CRC-32 of its bytes (ISO 3309).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fingerprint {
+    bytes: u64,
+    crc32: u32,
+}
+
+impl Fingerprint {
+    fn of(bytes: &[u8]) -> Self {
+        Self { bytes: bytes.len() as u64, crc32: crc32fast::hash(bytes) }
+    }
 }
 
 /// What a project file holds beside the document. Hand the same one back when saving.
@@ -120,14 +143,16 @@ impl Project {
     }
 
     /// Writes a project: whole or not at all; the file that was there before goes on as `<name>.bak`.
-    /// The same document and meta give the same bytes.
+    /// The same document and meta give the same bytes. Returns what the file is now.
     ///
     /// # Errors
-    /// When the file cannot be written.
-    pub fn save(path: &Path, document: &Document, meta: &ProjectMeta) -> Result<(), ProjectError> {
-        write::to_text(path, document, meta)
-            .map_err(ProjectProblem::from)
-            .and_then(|text| Ok(atomic::write(path, text.as_bytes())?))
-            .map_err(|problem| ProjectError { file: path.to_owned(), problem })
+    /// When the file cannot be written, or is a link that leads out of its folder.
+    pub fn save(path: &Path, document: &Document, meta: &ProjectMeta) -> Result<Fingerprint, ProjectError> {
+        let written = || {
+            let text = write::to_text(path, document, meta)?;
+            atomic::write(path, text.as_bytes())?;
+            Ok(Fingerprint::of(text.as_bytes()))
+        };
+        written().map_err(|problem| ProjectError { file: path.to_owned(), problem })
     }
 }

@@ -4,6 +4,8 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
+use crate::project::LocalRecord;
+
 /// Largest relative difference at which a matrix counts as exactly a translation, rotation and scale.
 const EXACT_TRS_TOLERANCE: f64 = 1e-12;
 /// Shortest and longest axis that single precision on the device can square (f32 ends at 3.4e38).
@@ -50,7 +52,8 @@ impl Default for Trs {
 }
 
 /// The transform of a node against its parent.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "LocalRecord", into = "LocalRecord")]
 pub enum Local {
     /// The usual form.
     Trs(Trs),

@@ -53,6 +53,8 @@ pub enum Action {
     SaveAs,
     /// Ask where to write the scene as glTF.
     Export,
+    /// Look for unsaved changes that were left behind.
+    Recover,
     /// End the program.
     Quit,
     /// Undo a step.
@@ -208,6 +210,7 @@ fn file() -> Vec<Command> {
         file(icon::FLOPPY_DISK, "Save", Action::Save, Some((CTRL, Key::S))),
         file(icon::FLOPPY_DISK_BACK, "Save as\u{2026}", Action::SaveAs, Some((CTRL_SHIFT, Key::S))),
         file(icon::EXPORT, "Export\u{2026}", Action::Export, Some((CTRL, Key::E))),
+        file(icon::CLOCK_COUNTER_CLOCKWISE, "Recover unsaved changes\u{2026}", Action::Recover, None),
         file(icon::SIGN_OUT, "Quit", Action::Quit, Some((CTRL, Key::Q))),
     ]
 }

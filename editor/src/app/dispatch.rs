@@ -32,6 +32,7 @@ impl Editor {
             Action::Save => self.save(),
             Action::SaveAs => self.ask(Wish::SaveAs),
             Action::Export => self.ask(Wish::Export),
+            Action::Recover => self.guarded(Then::Recover),
             Action::Quit => self.guarded(Then::Quit),
             Action::Undo | Action::Redo => self.undo_or_redo(action == Action::Undo),
             Action::Duplicate => self.duplicate(),

@@ -1,17 +1,18 @@
 //! The editor without its window: session, memory, panels and what goes on besides. Enters: egui's frame. Leaves:
 //! drawings and a changed session. It knows no winit and no swapchain, so that it can run in a test.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use caustica_scene::{Finding, audit};
+use caustica_scene::{Finding, LeftBehind, audit};
 use egui::{CentralPanel, Context, Frame, Id, Margin, Modal, Panel, Ui, WidgetText};
 use egui_dock::{DockArea, DockState, TabViewer};
 
 use super::actions::{self, Action};
 use super::export::Exporting;
 use super::files::Loading;
+use super::recovery::Recovering;
 use crate::dialogs::Dialogs;
 use crate::panels::{self, Cx, bars, overlays};
 use crate::session::Session;
@@ -28,6 +29,8 @@ pub(super) enum Then {
     AskAndOpen,
     /// Open this file.
     Open(PathBuf),
+    /// Look for unsaved changes that were left behind.
+    Recover,
     /// End the program.
     Quit,
 }
@@ -42,6 +45,13 @@ pub struct Editor {
     pub(super) dialogs: Dialogs,
     pub(super) loading: Option<Loading>,
     pub(super) exporting: Option<Exporting>,
+    /// Unsaved changes of other runs that the user is asked about, newest first.
+    pub(super) left_behind: Vec<LeftBehind>,
+    /// Files of those that the user wants to hear of later.
+    pub(super) later: BTreeSet<PathBuf>,
+    pub(super) recovering: Option<Recovering>,
+    /// The project that was opened, and files that it names outside of its folder, while the user is asked about them.
+    pub(super) outside: Option<(PathBuf, Vec<PathBuf>)>,
     /// Files to import after the present one.
     pub(super) waiting: VecDeque<PathBuf>,
     /// The audit that is running, and the state of the document that it looks at.
@@ -71,6 +81,10 @@ impl Editor {
             dialogs: Dialogs::default(),
             loading: None,
             exporting: None,
+            left_behind: Vec::new(),
+            later: BTreeSet::new(),
+            recovering: None,
+            outside: None,
             waiting: VecDeque::new(),
             audit: None,
             question: None,
@@ -106,30 +120,16 @@ impl Editor {
         format!("{mark}{} \u{2013} Caustica", name.as_deref().unwrap_or("unsaved scene"))
     }
 
-    /// Saves what is not saved to a place of its own, as when the device is lost; gives the file's name.
-    pub fn rescue(&self) -> Option<PathBuf> {
-        if !self.session.is_modified() {
-            return None;
-        }
-        let folder =
-            self.session.path().and_then(Path::parent).map_or_else(std::env::temp_dir, Path::to_path_buf);
-        let path = folder.join(format!("rescued-{}.caustica.json", std::process::id()));
-        let meta = caustica_scene::ProjectMeta::default();
-        match caustica_scene::Project::save(&path, self.session.document(), &meta) {
-            Ok(()) => Some(path),
-            Err(error) => {
-                tracing::error!("the unsaved changes cannot be rescued: {error}");
-                None
-            }
-        }
-    }
-
     /// Draws everything and carries out what was asked for.
     pub fn ui(&mut self, ui: &mut Ui) {
         let context = ui.ctx().clone();
         self.apply_theme(&context);
         self.poll_loading();
         self.poll_exporting();
+        self.poll_recovering();
+        if let Some(fault) = self.session.scene_mut().take_journal_fault() {
+            self.state.toasts.error(fault);
+        }
         self.play(Instant::now());
         self.keep_audited();
         self.take_keys(&context);
@@ -209,7 +209,7 @@ impl Editor {
         let busy = self.state.view.flying
             || self.state.view.drag.is_some()
             || self.state.palette.is_some()
-            || self.question.is_some()
+            || self.asks()
             || self.dialogs.is_open();
         if !busy {
             let typing = context.text_edit_focused();
@@ -278,7 +278,8 @@ impl Editor {
             self.state.toasts.info("Cancelled.");
         }
         if self.loading.is_none()
-            && let Some((label, progress)) = self.exporting.as_ref().map(Exporting::progress)
+            && let Some((label, progress)) = (self.recovering.as_ref().map(Recovering::progress))
+                .or_else(|| self.exporting.as_ref().map(Exporting::progress))
         {
             overlays::progress(context, &self.state, &label, &progress, false);
         }
@@ -286,7 +287,18 @@ impl Editor {
         overlays::help(&mut self.state, &self.session, context);
         overlays::toasts(&mut self.state, context);
         overlays::drop_hint(context);
-        self.ask_about_changes(context);
+        if self.question.is_some() {
+            self.ask_about_changes(context);
+        } else if !self.left_behind.is_empty() {
+            self.ask_to_recover(context);
+        } else {
+            self.ask_about_outside(context);
+        }
+    }
+
+    /// Whether a question waits for its answer.
+    fn asks(&self) -> bool {
+        self.question.is_some() || !self.left_behind.is_empty() || self.outside.is_some()
     }
 
     fn ask_about_changes(&mut self, context: &Context) {

@@ -109,8 +109,8 @@ impl Editor {
             Purpose::Import => format!("Importing {name}"),
             Purpose::Source(_) => format!("Reading {name}"),
         };
-        let file = path.clone();
-        match Job::start(label, self.wake.clone(), move |progress| session::load(&file, progress)) {
+        let (file, outside) = (path.clone(), self.state.config.trusts(&path));
+        match Job::start(label, self.wake.clone(), move |progress| session::load(&file, outside, progress)) {
             Ok(job) => self.loading = Some(Loading { purpose, path, job }),
             Err(error) => self.state.toasts.error(format!("{} cannot be read: {error}.", path.display())),
         }
@@ -148,10 +148,16 @@ impl Editor {
 
     fn open(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
         let warnings = warning_count(&loaded);
+        let outside = match &loaded {
+            Loaded::Project(project) => project.outside.clone(),
+            _ => Vec::new(),
+        };
         self.session.open(path, loaded)?;
         self.state.config.remember(path);
         self.new_scene_shown();
         self.tell(format!("Opened {}", short(path)), warnings);
+        self.ask_about_left_behind_of(path);
+        self.outside = (!outside.is_empty()).then(|| (path.to_owned(), outside));
         Ok(())
     }
 
@@ -234,6 +240,9 @@ impl Editor {
         match self.session.save(path) {
             Ok(()) => {
                 self.state.config.remember(path);
+                if !self.session.scene().has_refused() {
+                    self.state.config.trust(path);
+                }
                 self.state.toasts.info(format!("Saved {}.", short(path)));
                 if let Some(then) = self.after_save.take() {
                     self.go_on(then);
@@ -255,7 +264,17 @@ impl Editor {
             },
             Then::AskAndOpen => self.ask(Wish::Open),
             Then::Open(path) => self.load(Purpose::Open, path),
-            Then::Quit => self.quit = true,
+            Then::Recover => {
+                self.ask_about_left_behind();
+                if self.left_behind.is_empty() {
+                    self.state.toasts.info("No unsaved changes were left behind.");
+                }
+            }
+            Then::Quit => {
+                // Saved, or its owner has just said that it is not wanted.
+                self.session.scene_mut().discard_journal();
+                self.quit = true;
+            }
         }
     }
 }

@@ -3,7 +3,6 @@
 
 mod frames;
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -22,6 +21,7 @@ use super::actions::Action;
 use super::adaptive::AdaptiveResolution;
 use super::editor::Editor;
 use crate::log_buffer::LogBuffer;
+use crate::recovery;
 use crate::session::{Session, SessionOptions, ViewCamera};
 use crate::theme;
 use crate::ui_renderer::UiRenderer;
@@ -146,7 +146,7 @@ impl EditorWindow {
         let scale = Some(window.scale_factor() as f32);
         let input =
             egui_winit::State::new(context.clone(), ViewportId::ROOT, &window, scale, None, Some(max_side));
-        let session = Session::new(
+        let mut session = Session::new(
             &device,
             SessionOptions {
                 shaders: options.shaders.clone(),
@@ -155,8 +155,13 @@ impl EditorWindow {
                 ..SessionOptions::default()
             },
         )?;
+        match recovery::folder() {
+            Some(folder) => session.scene_mut().keep_journal(&folder),
+            None => tracing::warn!("unsaved changes are not kept: neither XDG_DATA_HOME nor HOME is set"),
+        }
         let mut editor = Editor::new(session, config, wake);
         editor.state.log = log;
+        editor.ask_about_left_behind();
         tracing::info!("{} ({})", device.name(), device.driver());
         if let Some(file) = &options.file {
             editor.request(Action::OpenPath(file.clone()));
@@ -218,9 +223,9 @@ impl EditorWindow {
         self.redraw_at.map_or(ControlFlow::Wait, ControlFlow::WaitUntil)
     }
 
-    /// Writes unsaved changes to a place of their own.
-    pub(super) fn rescue(&self) -> Option<PathBuf> {
-        self.editor.rescue()
+    /// Whether there are unsaved changes that the next run can recover.
+    pub(super) fn keeps_changes(&self) -> bool {
+        self.editor.session.scene().keeps_changes()
     }
 
     /// Keeps layout, theme and recent files for the next run.

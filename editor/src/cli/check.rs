@@ -7,13 +7,15 @@ use caustica_scene::{Mesh, Severity, audit};
 use clap::Args;
 use serde_json::json;
 
-use super::{EXIT_INPUT, document_of};
+use super::{EXIT_INPUT, SourceArgs, document_of};
 
 /// Arguments of `caustica check`.
 #[derive(Args, Debug)]
 pub(super) struct CheckArgs {
     /// A project, .gltf, .glb, .obj, or a text file of spheres and boxes
     file: PathBuf,
+    #[command(flatten)]
+    sources: SourceArgs,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -21,7 +23,7 @@ pub(super) struct CheckArgs {
 
 /// Audits the file.
 pub(super) fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
-    let (document, warnings) = document_of(&args.file)?;
+    let (document, warnings) = document_of(&args.file, args.sources)?;
     let findings = audit(&document);
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
     let placed = |count: fn(&Mesh) -> usize| -> usize {

@@ -7,13 +7,15 @@ use caustica_scene::{ExportFormat, export};
 use clap::Args;
 use serde_json::json;
 
-use super::document_of;
+use super::{SourceArgs, document_of};
 
 /// Arguments of `caustica export`.
 #[derive(Args, Debug)]
 pub(super) struct ExportArgs {
     /// A project, .gltf, .glb, .obj, or a text file of spheres and boxes
     file: PathBuf,
+    #[command(flatten)]
+    sources: SourceArgs,
     /// The file to write: .glb, or .gltf with a .bin beside it
     #[arg(short, long, value_name = "OUT", value_parser = parse_output)]
     output: PathBuf,
@@ -24,7 +26,7 @@ pub(super) struct ExportArgs {
 
 /// Writes the scene.
 pub(super) fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
-    let (document, import_warnings) = document_of(&args.file)?;
+    let (document, import_warnings) = document_of(&args.file, args.sources)?;
     let exported = export(&document, &args.output)?;
     exported.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
     let (nodes, meshes, materials) = (exported.nodes, exported.meshes, exported.materials);

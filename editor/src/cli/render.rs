@@ -21,7 +21,7 @@ use args::{settings_of, without_effect};
 
 use super::DeviceArgs;
 use super::output::{self, Kind, Metadata};
-use crate::session::{Session, SessionOptions, ViewCamera, environment_argument, load};
+use crate::session::{Session, SessionOptions, ViewCamera, environment_argument};
 
 /// Frames of which the times are kept for the median.
 const TIMED_FRAMES: usize = 4096;
@@ -52,7 +52,7 @@ pub(super) fn run(
     let start = Instant::now();
     let progress = progress_bar(args);
     progress.set_message("loading");
-    let loaded = load(&args.file, &|step, share| {
+    let loaded = args.sources.load(&args.file, &|step, share| {
         progress.set_message(step.to_owned());
         progress.set_position((share * 100.0) as u64);
     })?;

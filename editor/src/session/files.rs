@@ -31,14 +31,16 @@ pub enum Loaded {
     Environment(PathBuf, Arc<RadianceMap>),
 }
 
-/// Reads a project, a model, spheres and boxes, or an environment, by the ending of its name. `progress`: step and share done.
+/// Reads a project, a model, spheres and boxes, or an environment, by the ending of its name. `outside`: also what a project
+/// names outside of its folder. `progress`: step and share done.
 ///
 /// # Errors
 /// When the file cannot be read, with file, place and reason.
-pub fn load(path: &Path, progress: &dyn Fn(&str, f32)) -> anyhow::Result<Loaded> {
+pub fn load(path: &Path, outside: bool, progress: &dyn Fn(&str, f32)) -> anyhow::Result<Loaded> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     if Project::is_project_path(path) {
-        let project = Project::load_with_progress(path, &ImportOptions::default(), progress)?;
+        let options = ImportOptions { outside_project: outside, ..ImportOptions::default() };
+        let project = Project::load_with_progress(path, &options, progress)?;
         project.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
         return Ok(Loaded::Project(Box::new(project)));
     }
@@ -62,33 +64,24 @@ pub fn load(path: &Path, progress: &dyn Fn(&str, f32)) -> anyhow::Result<Loaded>
     }
 }
 
-/// A document that was opened.
-pub(super) struct Opened {
-    pub(super) document: Document,
-    pub(super) meta: ProjectMeta,
-    pub(super) path: Option<PathBuf>,
-    pub(super) camera: Option<ViewCamera>,
-    pub(super) settings: Option<ViewSettings>,
+/// What was opened.
+pub(super) enum Opened {
+    /// A project, with its file.
+    Project(PathBuf, Box<Project>),
+    /// A scene without a file.
+    Unsaved(Box<Document>),
 }
 
-/// Makes a document of what was loaded.
+/// Makes a document of what was loaded, all of it new.
 pub(super) fn open(path: &Path, loaded: Loaded) -> anyhow::Result<Opened> {
     match loaded {
-        Loaded::Project(project) => {
-            let Project { document, meta, .. } = *project;
-            let camera = meta.view.get(CAMERA_KEY).and_then(|v| serde_json::from_value(v.clone()).ok());
-            let settings = (!meta.render.is_empty())
-                .then(|| serde_json::from_value(serde_json::Value::Object(meta.render.clone())));
-            let settings = settings.and_then(|read| {
-                read.inspect_err(|error| tracing::warn!("{}: render settings: {error}", path.display())).ok()
-            });
-            Ok(Opened { document, meta, path: Some(absolute(path)), camera, settings })
-        }
+        Loaded::Project(project) => Ok(Opened::Project(absolute(path), project)),
         other => {
             let mut document = Document::new();
             let brought = import(&mut document, path, other)?;
             document.apply(brought.edit)?;
-            Ok(Opened { document, meta: ProjectMeta::default(), path: None, camera: None, settings: None })
+            document.mark_all_added("opened a file");
+            Ok(Opened::Unsaved(Box::new(document)))
         }
     }
 }
@@ -96,6 +89,17 @@ pub(super) fn open(path: &Path, loaded: Loaded) -> anyhow::Result<Opened> {
 /// The path whatever the working folder becomes; as it was where the system gives no working folder.
 fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// Camera and settings that a project notes.
+pub(super) fn noted_view(meta: &ProjectMeta) -> (Option<ViewCamera>, Option<ViewSettings>) {
+    let camera = meta.view.get(CAMERA_KEY).and_then(|v| serde_json::from_value(v.clone()).ok());
+    let settings = (!meta.render.is_empty())
+        .then(|| serde_json::from_value(serde_json::Value::Object(meta.render.clone())));
+    let settings = settings.and_then(|read| {
+        read.inspect_err(|error| tracing::warn!("the project's render settings: {error}")).ok()
+    });
+    (camera, settings)
 }
 
 /// An edit that brings something in, and the node that it makes.
@@ -128,11 +132,12 @@ pub(super) fn import(document: &mut Document, path: &Path, loaded: Loaded) -> an
         Loaded::Shapes(file) => {
             let name =
                 file.path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-            let source = ShapeSource::File(file);
+            let source = ShapeSource::File(ShapeFile { path: absolute(&file.path), ..file });
             let (node, edit) = shapes_edit(document, &name, source, Local::default())?;
             Ok(Brought { edit, node: Some(node) })
         }
         Loaded::Environment(path, map) => {
+            let path = absolute(&path);
             let file = EnvironmentFile { path, rotation_rad: 0.0, scale: 1.0, map: Some(map) };
             Ok(Brought { edit: Edit::SetEnvironment(Environment::File(file)), node: None })
         }

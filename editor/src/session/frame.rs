@@ -70,7 +70,7 @@ impl Session {
     /// the next delta sends the whole document.
     fn send_all_again(&mut self) -> anyhow::Result<()> {
         // Marked first: should this fail too, the next frame still sends everything.
-        Arc::make_mut(&mut self.document).mark_all_added("tried again");
+        Arc::make_mut(&mut self.scene.document).mark_all_added("tried again");
         let mut recorder = self.frames.begin()?;
         let emptied = self.renderer.apply(&mut recorder, &std::mem::take(&mut self.sync).clear());
         self.frames.submit(recorder, None)?;
@@ -86,8 +86,12 @@ impl Session {
     ) -> anyhow::Result<()> {
         let mut lap = Lap::start();
         let eye = self.camera.world_from_camera.translation;
-        let changed = self.document.has_changes().then(|| Arc::make_mut(&mut self.document).drain_changes());
-        let delta = self.sync.delta_of(&self.document, &changed.unwrap_or_default(), eye);
+        let changed = self
+            .scene
+            .document
+            .has_changes()
+            .then(|| Arc::make_mut(&mut self.scene.document).drain_changes());
+        let delta = self.sync.delta_of(&self.scene.document, &changed.unwrap_or_default(), eye);
         self.host_times.sync_ms = lap.ms();
         let selection_stale = self.selection_changed || !delta.instances.is_empty();
         if let Err(error) = self.renderer.apply(recorder, &delta) {
@@ -97,7 +101,7 @@ impl Session {
         }
         self.host_times.apply_ms = lap.ms();
         if selection_stale {
-            self.renderer.select(self.view, outlined(&self.document, &self.selection).into_iter())?;
+            self.renderer.select(self.view, outlined(&self.scene.document, &self.selection).into_iter())?;
             self.selection_changed = false;
         }
         let camera = camera_of(
@@ -189,7 +193,7 @@ impl Session {
     pub fn pick(&mut self, pixel: [u32; 2]) -> anyhow::Result<Option<Pick>> {
         let Some(hit) = self.renderer.pick(&mut self.frames, self.view, pixel)? else { return Ok(None) };
         let node = NodeId(hit.instance.node);
-        let is_prefab = self.document.node(node).is_some_and(|node| node.prefab().is_some());
+        let is_prefab = self.scene.document.node(node).is_some_and(|node| node.prefab().is_some());
         let target = if is_prefab { Target::part(node, hit.instance.part) } else { Target::node(node) };
         let centre = [pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5];
         let (origin, direction) = self.renderer.camera_ray(self.view, centre)?;

@@ -25,7 +25,7 @@ impl Session {
     /// # Errors
     /// When memory runs out or the device is lost.
     pub fn fresh_inventory(&mut self) -> anyhow::Result<Inventory> {
-        let mut document = Document::clone(&self.document);
+        let mut document = Document::clone(&self.scene.document);
         document.mark_all_added("inventory");
         let delta = Sync::new().delta(&mut document, self.camera.world_from_camera.translation);
         let mut renderer = Renderer::new(&self.device, &mut self.frames, &RendererOptions::default())?;
@@ -42,9 +42,9 @@ impl Session {
     /// # Errors
     /// When the driver refuses; the next frame tries again.
     pub fn rebuild_scene(&mut self) -> anyhow::Result<()> {
-        Arc::make_mut(&mut self.document).mark_all_added("rebuilt acceleration structures");
+        Arc::make_mut(&mut self.scene.document).mark_all_added("rebuilt acceleration structures");
         self.selection_changed = true;
-        self.picture_revision += 1;
+        self.scene.picture_revision += 1;
         self.empty_renderer().inspect_err(|_| self.resync = true)
     }
 

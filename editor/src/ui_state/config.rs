@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 
 /// Most files in File > Open recent.
 const MOST_RECENT: usize = 12;
+/// Most projects that are trusted.
+const MOST_TRUSTED: usize = 1000;
 
 /// A panel that can be docked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -104,6 +106,8 @@ pub struct Config {
     pub dark: bool,
     /// Files opened last, newest first.
     pub recent: Vec<PathBuf>,
+    /// Projects that may read files outside of their folders: saved here, or allowed by the user.
+    pub trusted: Vec<PathBuf>,
     /// Size of the window, points.
     pub window: [f32; 2],
     /// Frame time that the resolution follows while something moves.
@@ -122,6 +126,7 @@ impl Default for Config {
         Self {
             dark: true,
             recent: Vec::new(),
+            trusted: Vec::new(),
             window: [1600.0, 960.0],
             target_frame_ms: 33.0,
             adaptive: true,
@@ -181,11 +186,25 @@ impl Config {
 
     /// Puts a file first among the recent ones.
     pub fn remember(&mut self, path: &Path) {
-        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-        self.recent.retain(|known| *known != path);
-        self.recent.insert(0, path);
-        self.recent.truncate(MOST_RECENT);
+        put_first(&mut self.recent, path, MOST_RECENT);
     }
+
+    /// Allows a project to read files outside of its folder.
+    pub fn trust(&mut self, project: &Path) {
+        put_first(&mut self.trusted, project, MOST_TRUSTED);
+    }
+
+    /// Whether a project may read files outside of its folder.
+    pub fn trusts(&self, project: &Path) -> bool {
+        std::path::absolute(project).is_ok_and(|project| self.trusted.contains(&project))
+    }
+}
+
+fn put_first(list: &mut Vec<PathBuf>, path: &Path, most: usize) {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    list.retain(|known| *known != path);
+    list.insert(0, path);
+    list.truncate(most);
 }
 
 /// Panels that were never drawn are at infinity, which JSON writes as null: their places are put to zero.

@@ -5,12 +5,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::project::EnvironmentRecord;
 
 /// What shines is cut at this radiance, far above every real light, so that a sum of samples stays finite.
 pub const MAX_RADIANCE: f32 = 1e15;
 
 /// What surrounds the scene, as the document says it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(from = "EnvironmentRecord", into = "EnvironmentRecord")]
 pub enum Environment {
     /// Nothing was said: see [`crate::Document::effective_environment`].
     #[default]

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use image::{ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::{ImportError, Warning};
 use crate::assets::RadianceMap;
@@ -12,6 +12,10 @@ use crate::assets::RadianceMap;
 const MAX_EXTENT_PX: u32 = 16_384;
 /// Largest memory for decoding, bytes: four 32-bit channels and a working copy.
 const MAX_ALLOC_BYTES: u64 = 8 << 30;
+
+/// Most texels that a byte of a file can stand for. Old Radiance files say a row of up to 16,384 equal texels in 8 bytes;
+/// deflate in OpenEXR reaches 1032 bytes a byte, of which a texel has at least 2.
+const MOST_TEXELS_A_BYTE: u64 = 2048;
 
 /// Reads an equirectangular environment. Values that are negative or not finite become 0 and are counted.
 ///
@@ -31,7 +35,14 @@ pub fn load_environment(path: &Path) -> Result<(RadianceMap, Vec<Warning>), Impo
     limits.max_image_height = Some(MAX_EXTENT_PX);
     limits.max_alloc = Some(MAX_ALLOC_BYTES);
     reader.limits(limits);
-    let image = reader.decode().map_err(|error| fail(error.to_string()))?.into_rgb32f();
+    let decoder = reader.into_decoder().map_err(|error| fail(error.to_string()))?;
+    let (width, height) = decoder.dimensions();
+    let length = std::fs::metadata(path).map_err(|error| fail(error.to_string()))?.len();
+    // Before memory is taken for texels that cannot be there.
+    if u64::from(width) * u64::from(height) > length.saturating_mul(MOST_TEXELS_A_BYTE) {
+        return Err(fail(format!("it claims {width} x {height} texels, which {length} bytes cannot hold")));
+    }
+    let image = DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))?.into_rgb32f();
     let (width, height) = image.dimensions();
     if width == 0 || height == 0 {
         return Err(fail("the image has no texels".to_owned()));
@@ -59,4 +70,47 @@ pub fn load_environment(path: &Path) -> Result<(RadianceMap, Vec<Warning>), Impo
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let map = RadianceMap { name, width, height, rgb };
     Ok((map, warnings))
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    fn refused(name: &str, bytes: &[u8]) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        load_environment(&path).unwrap_err().reason
+    }
+
+    #[test]
+    fn sizes_that_the_bytes_cannot_hold_are_refused() {
+        let hdr = |width, height| format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n");
+        let within = refused("a.hdr", hdr(MAX_EXTENT_PX, MAX_EXTENT_PX).as_bytes());
+        assert!(within.contains("claims 16384 x 16384 texels"), "{within}");
+        for (width, height) in [(4_000_000_000_u32, 1_u32), (1, 4_000_000_000), (16_385, 16_385)] {
+            let reason = refused("a.hdr", hdr(width, height).as_bytes());
+            assert!(!reason.contains("claims"), "the decoder's own limit is met first: {reason}");
+        }
+    }
+
+    #[test]
+    fn sizes_claimed_by_an_openexr_file_are_refused_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("small.exr");
+        image::Rgb32FImage::new(4, 2).save(&path).unwrap();
+        let small = std::fs::read(&path).unwrap();
+        assert!(load_environment(&path).is_ok());
+        let window = small.windows(10).position(|bytes| bytes == b"dataWindow").unwrap();
+        // Name and type, each with a zero, and the length of the value; then the corners.
+        let corner = window + b"dataWindow\0box2i\0".len() + 4 + 8;
+        let mut large = small.clone();
+        for (side, place) in [(MAX_EXTENT_PX, corner), (MAX_EXTENT_PX, corner + 4)] {
+            large[place..place + 4].copy_from_slice(&(side as i32 - 1).to_le_bytes());
+        }
+        let reason = refused("large.exr", &large);
+        // The decoder counts the blocks of the file first.
+        assert!(["chunk count", "claims"].iter().any(|words| reason.contains(words)), "{reason}");
+    }
 }

@@ -19,10 +19,8 @@ pub(super) fn resolve(uri: &str, folder: &Path) -> Result<Location, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         return decode_data(data).map(Location::Data);
     }
-    if let Some((scheme, _)) = uri.split_once(':')
-        && scheme.len() > 1
-        && is_scheme(scheme)
-    {
+    if is_address(uri) {
+        let scheme = uri.split(':').next().unwrap_or_default();
         return Err(format!("\"{uri}\" names a {scheme} address; only files beside the model are read"));
     }
     let decoded = percent_decode_str(uri)
@@ -55,12 +53,31 @@ pub(super) fn beside(name: &str, folder: &Path) -> Result<PathBuf, String> {
             part => parts.push(part),
         }
     }
-    Ok(parts.iter().fold(folder.to_owned(), |path, part| path.join(part)))
+    let path = parts.iter().fold(folder.to_owned(), |path, part| path.join(part));
+    if leads_out(&path, folder) {
+        return Err(format!(
+            "\"{name}\" is a link that leads out of the folder of the model, which is not allowed"
+        ));
+    }
+    Ok(path)
 }
 
-fn is_scheme(text: &str) -> bool {
-    text.starts_with(|c: char| c.is_ascii_alphabetic())
-        && text.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.'))
+/// Whether a file that is there lies outside of a folder once links are followed.
+pub(crate) fn leads_out(path: &Path, folder: &Path) -> bool {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    match (path.canonicalize(), folder.canonicalize()) {
+        (Ok(path), Ok(folder)) => !path.starts_with(folder),
+        _ => false,
+    }
+}
+
+/// Whether a text begins with the scheme of an address, such as `http:`. A single letter is a drive.
+pub(crate) fn is_address(text: &str) -> bool {
+    text.split_once(':').is_some_and(|(scheme, _)| {
+        scheme.len() > 1
+            && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+            && scheme.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.'))
+    })
 }
 
 fn decode_data(data: &str) -> Result<Vec<u8>, String> {
@@ -106,6 +123,7 @@ fn decode_base64(text: &[u8]) -> Result<Vec<u8>, String> {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
 
@@ -141,5 +159,25 @@ mod tests {
         ] {
             assert!(file(bad).is_err(), "{bad}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_only_inside_of_the_folder() {
+        let root = tempfile::tempdir().unwrap();
+        let models = root.path().join("models");
+        std::fs::create_dir(&models).unwrap();
+        std::fs::write(models.join("a.png"), "a").unwrap();
+        std::fs::write(root.path().join("secret"), "s").unwrap();
+        let link = |from: &str, to: &str| std::os::unix::fs::symlink(to, models.join(from)).unwrap();
+        link("inside.png", "a.png");
+        link("outside.png", "../secret");
+        link("up", "..");
+        assert!(beside("inside.png", &models).is_ok());
+        for bad in ["outside.png", "up/secret"] {
+            assert!(beside(bad, &models).unwrap_err().contains("link"), "{bad}");
+        }
+        // A file that is not there is somebody else's fault.
+        assert!(beside("absent.png", &models).is_ok());
     }
 }

@@ -6,13 +6,11 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crate::import::leads_out;
+
 /// Writes to a temporary file in the same folder, makes it durable and renames it into place.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // A link stays a link: what it points to is replaced.
-    let path = match fs::canonicalize(path) {
-        Ok(real) => real,
-        Err(_) => path.to_owned(),
-    };
+    let path = behind_links(path)?;
     let temporary = beside(&path, &format!(".{}.tmp", std::process::id()));
     let written = write_durably(&temporary, bytes)
         .and_then(|()| keep_backup(&path))
@@ -25,9 +23,30 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     written
 }
 
+/// A link stays a link: what it points to is replaced. One that leads out of its folder is not followed, since a project
+/// from elsewhere may have brought it; nor is it replaced, since its owner may have made it.
+fn behind_links(path: &Path) -> io::Result<PathBuf> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if leads_out(path, folder) {
+        let reason =
+            "is a link that leads out of its folder; open the file itself, or save under another name";
+        return Err(io::Error::new(io::ErrorKind::PermissionDenied, reason));
+    }
+    Ok(fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()))
+}
+
+/// A new file in the place of what a run that was cut off has left there. A link in its place is not followed.
+fn create(path: &Path) -> io::Result<File> {
+    if let Err(error) = fs::remove_file(path)
+        && error.kind() != io::ErrorKind::NotFound
+    {
+        return Err(error);
+    }
+    OpenOptions::new().write(true).create_new(true).open(path)
+}
+
 fn write_durably(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut options = OpenOptions::new();
-    let mut file = options.write(true).create(true).truncate(true).open(path)?;
+    let mut file = create(path)?;
     file.write_all(bytes)?;
     file.sync_all()
 }
@@ -37,10 +56,16 @@ fn keep_backup(path: &Path) -> io::Result<()> {
     if !path.exists() {
         return Ok(());
     }
-    let copy = beside(path, ".bak.tmp");
-    fs::copy(path, &copy)?;
-    File::open(&copy)?.sync_all()?;
-    fs::rename(&copy, beside(path, ".bak"))
+    let temporary = beside(path, ".bak.tmp");
+    let mut copy = create(&temporary)?;
+    io::copy(&mut File::open(path)?, &mut copy)?;
+    copy.sync_all()?;
+    fs::rename(&temporary, backup_of(path))
+}
+
+/// Where the file before the last save is.
+pub(super) fn backup_of(path: &Path) -> PathBuf {
+    beside(path, ".bak")
 }
 
 fn sync_folder(path: &Path) -> io::Result<()> {
@@ -74,6 +99,31 @@ mod tests {
         let backup = folder.path().join("a.caustica.bak");
         assert_eq!(fs::read_to_string(backup).unwrap(), "two");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_that_were_planted_are_not_followed() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("project");
+        fs::create_dir(&folder).unwrap();
+        let precious = root.path().join("precious");
+        fs::write(&precious, "mine").unwrap();
+        let path = folder.join("a.caustica");
+        fs::write(&path, "one").unwrap();
+        let temporary = format!("a.caustica.{}.tmp", std::process::id());
+        for name in [temporary.as_str(), "a.caustica.bak", "a.caustica.bak.tmp"] {
+            std::os::unix::fs::symlink(&precious, folder.join(name)).unwrap();
+        }
+        write(&path, b"two").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "two");
+        assert_eq!(fs::read_to_string(folder.join("a.caustica.bak")).unwrap(), "one");
+        std::os::unix::fs::symlink(&precious, folder.join("link.caustica")).unwrap();
+        assert!(write(&folder.join("link.caustica"), b"three").unwrap_err().to_string().contains("link"));
+        std::os::unix::fs::symlink("a.caustica", folder.join("near.caustica")).unwrap();
+        write(&folder.join("near.caustica"), b"four").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "four");
+        assert_eq!(fs::read_to_string(&precious).unwrap(), "mine");
     }
 
     #[test]

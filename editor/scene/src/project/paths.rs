@@ -1,7 +1,19 @@
-//! Paths in a project file: relative to it wherever there is a way, with forward slashes.
-//! Works on the text of paths; nothing is opened.
+//! Paths in a project file: relative to it wherever there is a way, with forward slashes. What leads out of the folder of
+//! the project is read by permission only, what names another machine never.
+//! Works on the text of paths; of files only links are looked at.
 
 use std::path::{Component, Path, PathBuf, absolute};
+
+use crate::import::{is_address, leads_out};
+
+/// Why a path is not followed.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Refusal {
+    /// It lies outside of the folder of the project.
+    Outside(PathBuf),
+    /// Never followed, with the reason.
+    Never(String),
+}
 
 /// `path` as seen from the folder of the project; absolute when they have no common root.
 pub(super) fn to_relative(project: &Path, path: &Path) -> String {
@@ -16,14 +28,42 @@ pub(super) fn to_relative(project: &Path, path: &Path) -> String {
     }
     let ups = base_parts.iter().skip(common).map(|_| Component::ParentDir);
     let rest = target_parts.into_iter().skip(common);
-    with_slashes(&ups.chain(rest).collect::<PathBuf>())
+    let text = with_slashes(&ups.chain(rest).collect::<PathBuf>());
+    // A colon in the first name would read as a drive or an address (RFC 3986, section 4.2).
+    if text.split('/').next().is_some_and(|name| name.contains(':')) { format!("./{text}") } else { text }
 }
 
-/// The other way round.
+/// The other way round; nothing is refused, and the path may lead anywhere.
 pub(super) fn from_relative(project: &Path, text: &str) -> PathBuf {
-    let project = normalized(project);
-    let folder = project.parent().unwrap_or(Path::new(""));
-    normalized(&folder.join(text))
+    normalized(&folder_of(project).join(text))
+}
+
+/// The other way round, within the folder of the project.
+pub(super) fn resolve(project: &Path, text: &str) -> Result<PathBuf, Refusal> {
+    if text.is_empty() || text.contains('\0') {
+        return Err(Refusal::Never("the file name is empty or holds a zero byte".to_owned()));
+    }
+    if is_address(text) || text.starts_with("//") || text.starts_with("\\\\") {
+        return Err(Refusal::Never(format!(
+            "\"{text}\" names another machine or an address; only files are read"
+        )));
+    }
+    let folder = folder_of(project);
+    let path = from_relative(project, text);
+    let drive = text.as_bytes().get(1) == Some(&b':');
+    if drive || !path.starts_with(&folder) || leads_out(&path, &folder) {
+        return Err(Refusal::Outside(path));
+    }
+    Ok(path)
+}
+
+/// A path whatever the working folder becomes, as text.
+pub(super) fn absolute_text(path: &Path) -> String {
+    with_slashes(&normalized(path))
+}
+
+fn folder_of(project: &Path) -> PathBuf {
+    normalized(project).parent().unwrap_or(Path::new("")).to_owned()
 }
 
 /// Absolute, without `.` and `..`.
@@ -61,6 +101,8 @@ mod tests {
         for (path, text) in [
             ("/a/b/x.glb", "x.glb"),
             ("/a/b/c/x.glb", "c/x.glb"),
+            ("/a/b/c:x.glb", "./c:x.glb"),
+            ("/a/b/http:x.glb", "./http:x.glb"),
             ("/a/x.glb", "../x.glb"),
             ("/z/x.glb", "../../z/x.glb"),
         ] {
@@ -68,5 +110,44 @@ mod tests {
             assert_eq!(from_relative(project, text), Path::new(path));
         }
         assert_eq!(from_relative(project, "/q/x.glb"), Path::new("/q/x.glb"));
+    }
+
+    #[test]
+    fn what_leads_out_of_the_folder_is_told_from_what_stays_inside() {
+        let project = Path::new("/a/b/scene.caustica");
+        let inside = |path: &str| Ok(PathBuf::from(path));
+        for (text, expected) in [
+            ("x.glb", inside("/a/b/x.glb")),
+            ("c/../x.glb", inside("/a/b/x.glb")),
+            ("/a/b/c/x.glb", inside("/a/b/c/x.glb")),
+            ("./c:x.glb", inside("/a/b/c:x.glb")),
+            // Nothing is decoded: these are odd names.
+            ("%2e%2e/x.glb", inside("/a/b/%2e%2e/x.glb")),
+        ] {
+            assert_eq!(resolve(project, text), expected, "{text}");
+        }
+        for text in
+            ["../x.glb", "c/../../x.glb", "/etc/passwd", "/a/bc/x.glb", "C:/x.glb", "c:x.glb", "C:\\x.glb"]
+        {
+            assert!(matches!(resolve(project, text), Err(Refusal::Outside(_))), "{text}");
+        }
+        for text in [
+            "",
+            "a\0b",
+            "//host/x.glb",
+            "\\\\host\\x.glb",
+            "http://host/x.glb",
+            "file:///etc/passwd",
+            "smb:x",
+        ] {
+            assert!(matches!(resolve(project, text), Err(Refusal::Never(_))), "{text}");
+        }
+    }
+
+    #[cfg(windows)]
+    #[test]
+    fn backslashes_part_names_on_windows() {
+        let project = Path::new("C:\\a\\b\\scene.caustica");
+        assert!(matches!(resolve(project, "..\\x.glb"), Err(Refusal::Outside(_))));
     }
 }

@@ -1,26 +1,25 @@
-//! A project file to a document: check the version, import the prefabs, lay the edits over them.
+//! A project file to a document: bring it to this version, import the prefabs, lay the edits over them.
 //! In: a path. Out: [`Project`]. What is missing becomes a placeholder of the same ids, and a warning.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DAffine3;
 use serde_json::Value;
 
-use super::paths::from_relative;
+use super::paths::{Refusal, from_relative, resolve};
 use super::record::{
     CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, PrefabRecord, ProjectRecord,
-    ShapesRecord,
+    ShapeMeshRecord, ShapesRecord, placeholder,
 };
-use super::{Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION};
-use crate::assets::{Environment, EnvironmentFile, Material, Mesh, MeshData, ShapeFile, ShapeSource};
+use super::{Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, migrate};
+use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, ShapeSource};
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
 use crate::ids::Target;
 use crate::import::{self, ImportOptions, Warning};
-use crate::node::{Node, NodeKind, Subtree};
+use crate::node::{Node, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage, package_with_ids};
-use crate::prefab::Prefab;
 
 /// Reads a project.
 pub(super) fn load(
@@ -28,67 +27,106 @@ pub(super) fn load(
     options: &ImportOptions,
     progress: &dyn Fn(&str, f32),
 ) -> Result<Project, ProjectProblem> {
-    let record = parse(&std::fs::read(path)?)?;
-    let last_id = record.next_id.saturating_sub(1).max(record.largest_id());
-    let mut loader = Loader {
-        path,
-        document: Document::new(),
-        meta: ProjectMeta { view: record.view, render: record.render, ..ProjectMeta::default() },
-        warnings: Vec::new(),
-    };
-    loader.meta.kept.top = record.other;
-    // Before anything new gets an id, so that none in the file is taken.
-    loader.document.reserve_ids_up_to(last_id);
-    let count = record.prefabs.len().max(1) as f32;
-    for (index, prefab) in record.prefabs.into_iter().enumerate() {
-        progress(&prefab.name, index as f32 / count);
-        loader.add_prefab(prefab, options)?;
-    }
-    for material in record.materials {
-        loader.add_material(material)?;
-    }
-    for shapes in record.shapes {
-        loader.add_shapes(shapes)?;
-    }
-    for mesh in record.meshes {
-        loader.move_primitives(mesh);
-    }
-    for node in record.nodes {
-        loader.add_node(node)?;
-    }
-    loader.set_environment(record.environment)?;
-    if let Some(camera) = record.camera {
-        loader.choose_camera(camera)?;
-    }
+    let bytes = read_file(path)?;
+    let loader = Loader::of_record(path, parse(&bytes)?, options, progress)?;
     let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    loader.document.mark_all_added(&format!("opened {name}"));
     progress(&name, 1.0);
-    Ok(Project { document: loader.document, meta: loader.meta, warnings: loader.warnings })
+    Ok(loader.finish(&format!("opened {name}"), Fingerprint::of(&bytes)))
 }
 
-fn parse(bytes: &[u8]) -> Result<ProjectRecord, ProjectProblem> {
+/// Refuses folders, devices and pipes: reading them could go on for ever.
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ProjectProblem> {
+    match std::fs::metadata(path)?.is_file() {
+        true => Ok(std::fs::read(path)?),
+        false => Err(ProjectProblem::Broken("is not a file".to_owned())),
+    }
+}
+
+/// The text of a project file as this version has it.
+pub(super) fn parse(bytes: &[u8]) -> Result<ProjectRecord, ProjectProblem> {
     let value: Value = serde_json::from_slice(bytes)?;
     let found = value.get("caustica").and_then(Value::as_u64).ok_or(ProjectProblem::NotAProject)?;
     if found > SCHEMA_VERSION {
         return Err(ProjectProblem::Newer { found });
     }
-    // Read from the text again, because errors then name a line.
-    Ok(serde_json::from_slice(bytes)?)
+    if found == SCHEMA_VERSION {
+        // From the text again, because errors then name a line.
+        return Ok(serde_json::from_slice(bytes)?);
+    }
+    serde_json::from_value(migrate::to_newest(found, value)).map_err(|error| {
+        // Where the old text has the same fault, the line in it.
+        serde_json::from_slice::<ProjectRecord>(bytes).map_or_else(Into::into, |_| error.into())
+    })
 }
 
-struct Loader<'a> {
+/// A document that comes into being, from a project and from what a journal adds to it.
+pub(super) struct Loader<'a> {
     path: &'a Path,
-    document: Document,
-    meta: ProjectMeta,
-    warnings: Vec<Warning>,
+    options: ImportOptions,
+    pub document: Document,
+    pub meta: ProjectMeta,
+    pub warnings: Vec<Warning>,
+    outside: Vec<PathBuf>,
 }
 
 fn broken(error: EditError) -> ProjectProblem {
     ProjectProblem::Broken(error.to_string())
 }
 
+impl<'a> Loader<'a> {
+    /// The document of a project that stands at `path`.
+    pub fn of_record(
+        path: &'a Path,
+        record: ProjectRecord,
+        options: &ImportOptions,
+        progress: &dyn Fn(&str, f32),
+    ) -> Result<Self, ProjectProblem> {
+        let last_id = record.next_id.saturating_sub(1).max(record.largest_id());
+        let mut loader = Loader {
+            path,
+            options: options.clone(),
+            document: Document::new(),
+            meta: ProjectMeta { view: record.view, render: record.render, ..ProjectMeta::default() },
+            warnings: Vec::new(),
+            outside: Vec::new(),
+        };
+        loader.meta.kept.top = record.other;
+        // Before anything new gets an id, so that none in the file is taken.
+        loader.document.reserve_ids_up_to(last_id);
+        let count = record.prefabs.len().max(1) as f32;
+        for (index, prefab) in record.prefabs.into_iter().enumerate() {
+            progress(&prefab.name, index as f32 / count);
+            loader.add_prefab(prefab)?;
+        }
+        for material in record.materials {
+            loader.add_material(material)?;
+        }
+        for shapes in record.shapes {
+            loader.add_shapes(shapes)?;
+        }
+        for mesh in record.meshes {
+            loader.move_primitives(mesh);
+        }
+        for node in record.nodes {
+            loader.add_node(node)?;
+        }
+        loader.set_environment(record.environment)?;
+        if let Some(camera) = record.camera {
+            loader.choose_camera(camera)?;
+        }
+        Ok(loader)
+    }
+
+    /// What has come into being; `reason` is why all of it is new.
+    pub fn finish(mut self, reason: &str, file: Fingerprint) -> Project {
+        self.document.mark_all_added(reason);
+        let Self { document, meta, warnings, outside, .. } = self;
+        Project { document, meta, warnings, outside, file }
+    }
+}
+
 impl Loader<'_> {
-    fn warn(&mut self, place: String, message: String) {
+    pub fn warn(&mut self, place: String, message: String) {
         self.warnings.push(Warning { file: self.path.to_owned(), place, message });
     }
 
@@ -96,28 +134,53 @@ impl Loader<'_> {
         self.document.apply(edit).map(|_| ()).map_err(broken)
     }
 
-    fn add_prefab(&mut self, record: PrefabRecord, options: &ImportOptions) -> Result<(), ProjectProblem> {
-        let source = from_relative(self.path, &record.source);
+    /// Where a path of the project leads, or why it is not followed. Noted when permission could be given.
+    fn locate(&mut self, text: &str) -> (PathBuf, Result<(), String>) {
+        match resolve(self.path, text) {
+            Ok(path) => (path, Ok(())),
+            Err(Refusal::Outside(path)) if self.options.outside_project => (path, Ok(())),
+            Err(Refusal::Outside(path)) => {
+                let reason =
+                    format!("\"{text}\" lies outside of the folder of the project and is not read unasked");
+                self.outside.push(path.clone());
+                (path, Err(reason))
+            }
+            Err(Refusal::Never(reason)) => (from_relative(self.path, text), Err(reason)),
+        }
+    }
+
+    fn add_prefab(&mut self, record: PrefabRecord) -> Result<(), ProjectProblem> {
+        let (source, allowed) = self.locate(&record.source);
         if !record.other.is_empty() {
             let kept = &mut self.meta.kept.prefabs;
             kept.insert(record.id.0, record.other.clone());
         }
-        let mut package = match import::load(&source, options) {
+        let package = match allowed {
+            Ok(()) => self.import(placeholder(&record, source)),
+            Err(reason) => self.without_source(placeholder(&record, source), reason),
+        };
+        self.apply(Edit::AddPrefab(Box::new(package)))
+    }
+
+    /// Imports the source of a placeholder, which stays in its place when the source cannot be read.
+    pub fn import(&mut self, placeholder: PrefabPackage) -> PrefabPackage {
+        let PrefabPackage { id, prefab, .. } = &placeholder;
+        match import::load(&prefab.source, &self.options) {
             Ok(mut imported) => {
                 self.warnings.append(&mut imported.warnings);
-                let ids = (&record.meshes[..], &record.materials[..], &record.textures[..]);
-                package_with_ids(&mut self.document, record.id, imported, ids)
+                let ids = (&prefab.meshes[..], &prefab.materials[..], &prefab.textures[..]);
+                let mut package = package_with_ids(&mut self.document, *id, imported, ids);
+                package.prefab.name.clone_from(&prefab.name);
+                package
             }
-            Err(error) => {
-                self.warn(
-                    format!("prefab {}", record.name),
-                    format!("{error}; a placeholder stands in and is kept on save"),
-                );
-                placeholder(&record, source)
-            }
-        };
-        package.prefab.name = record.name;
-        self.apply(Edit::AddPrefab(Box::new(package)))
+            Err(error) => self.without_source(placeholder, error.to_string()),
+        }
+    }
+
+    fn without_source(&mut self, placeholder: PrefabPackage, reason: String) -> PrefabPackage {
+        let message = format!("{reason}; a placeholder stands in and is kept on save");
+        self.warn(format!("prefab {}", placeholder.prefab.name), message);
+        placeholder
     }
 
     /// An edited material of a prefab, or one made in the program.
@@ -138,18 +201,14 @@ impl Loader<'_> {
 
     /// Spheres and boxes are made anew from their description. A file that is missing is kept on save.
     fn add_shapes(&mut self, record: ShapesRecord) -> Result<(), ProjectProblem> {
-        let ShapesRecord { id, name, source, materials, other } = record;
+        let ShapesRecord { id, mesh: ShapeMeshRecord { name, source, materials }, other } = record;
         if !other.is_empty() {
             self.meta.kept.shapes.insert(id.0, other);
         }
         let source = match source {
             ShapeSource::File(file) => {
-                let path = from_relative(self.path, &file.path.to_string_lossy());
-                let read = import::load_shapes(&path).or_else(|error| {
-                    self.warn(format!("shapes {name}"), format!("{error}; nothing stands in its place"));
-                    Ok::<_, ProjectProblem>(ShapeFile { path, shapes: None })
-                });
-                ShapeSource::File(read?)
+                let (path, allowed) = self.locate(&file.path.to_string_lossy());
+                ShapeSource::File(self.read_shapes(path, allowed))
             }
             other => other,
         };
@@ -157,6 +216,16 @@ impl Loader<'_> {
         let value = Mesh::of_shapes(name, source, &materials).map_err(|fault| problem(fault.to_string()))?;
         let edit = Edit::AddMesh { mesh: id, value: Box::new(value) };
         self.document.apply(edit).map(|_| ()).map_err(|error| problem(error.to_string()))
+    }
+
+    /// The shapes of a file, or none with a warning.
+    pub fn read_shapes(&mut self, path: PathBuf, allowed: Result<(), String>) -> ShapeFile {
+        let read = allowed.and_then(|()| import::load_shapes(&path).map_err(|error| error.to_string()));
+        read.unwrap_or_else(|reason| {
+            let place = format!("shapes {}", path.display());
+            self.warn(place, format!("{reason}; nothing stands in its place, and it is kept on save"));
+            ShapeFile { path, shapes: None }
+        })
     }
 
     fn without_lost_textures(&mut self, mut material: Material) -> Material {
@@ -195,34 +264,14 @@ impl Loader<'_> {
         }
     }
 
-    fn add_node(&mut self, record: NodeRecord) -> Result<(), ProjectProblem> {
-        let id = record.id;
-        if !record.other.is_empty() {
-            self.meta.kept.nodes.insert(id.0, record.other);
+    fn add_node(&mut self, mut record: NodeRecord) -> Result<(), ProjectProblem> {
+        let other = std::mem::take(&mut record.other);
+        if !other.is_empty() {
+            self.meta.kept.nodes.insert(record.id.0, other);
         }
-        let kind = match record {
-            NodeRecord { prefab: Some(prefab), overrides, clip, variant, .. } => NodeKind::Prefab {
-                prefab,
-                clip,
-                variant,
-                overrides: overrides.into_iter().map(|(path, value)| (path, value.into())).collect(),
-            },
-            NodeRecord { mesh: Some(mesh), materials, weights, .. } => {
-                NodeKind::Mesh { mesh, materials, weights }
-            }
-            NodeRecord { light: Some(light), .. } => NodeKind::Light(light),
-            NodeRecord { camera: Some(camera), .. } => NodeKind::Camera(camera),
-            _ => NodeKind::Group,
-        };
-        let node = Node {
-            visible: record.visible,
-            locked: record.locked,
-            ray_visibility: record.ray_visibility,
-            local: record.local.into(),
-            ..Node::new(record.name, kind)
-        };
+        let (id, node) = record.into_node();
         let edit =
-            Edit::AddNode { parent: record.parent, index: usize::MAX, subtree: Subtree::single(id, node) };
+            Edit::AddNode { parent: node.parent, index: usize::MAX, subtree: Subtree::single(id, node) };
         self.document
             .apply(edit)
             .map(|_| ())
@@ -231,26 +280,32 @@ impl Loader<'_> {
 
     fn set_environment(&mut self, record: EnvironmentRecord) -> Result<(), ProjectProblem> {
         let environment = match record {
-            EnvironmentRecord::Auto => Environment::Auto,
-            EnvironmentRecord::Sky => Environment::DefaultSky,
-            EnvironmentRecord::Constant { radiance } => Environment::Constant(radiance),
             EnvironmentRecord::File { path, rotation_rad, scale } => {
-                let path = from_relative(self.path, &path);
-                let map = match import::load_environment(&path) {
-                    Ok((map, mut warnings)) => {
-                        self.warnings.append(&mut warnings);
-                        Some(Arc::new(map))
-                    }
-                    Err(error) => {
-                        let message = format!("{error}; the surroundings are black");
-                        self.warn("environment".to_owned(), message);
-                        None
-                    }
-                };
-                Environment::File(EnvironmentFile { path, rotation_rad, scale, map })
+                let (path, allowed) = self.locate(&path);
+                Environment::File(
+                    self.read_map(EnvironmentFile { path, rotation_rad, scale, map: None }, allowed),
+                )
             }
+            other => other.into(),
         };
         self.apply(Edit::SetEnvironment(environment))
+    }
+
+    /// Reads the map of an environment, or leaves it without, with a warning.
+    pub fn read_map(&mut self, file: EnvironmentFile, allowed: Result<(), String>) -> EnvironmentFile {
+        let read =
+            allowed.and_then(|()| import::load_environment(&file.path).map_err(|error| error.to_string()));
+        match read {
+            Ok((map, mut warnings)) => {
+                self.warnings.append(&mut warnings);
+                EnvironmentFile { map: Some(Arc::new(map)), ..file }
+            }
+            Err(reason) => {
+                let message = format!("{reason}; the surroundings are black, and it is kept on save");
+                self.warn("environment".to_owned(), message);
+                file
+            }
+        }
     }
 
     fn choose_camera(&mut self, record: CameraRecord) -> Result<(), ProjectProblem> {
@@ -273,28 +328,5 @@ impl Loader<'_> {
                 Ok(())
             }
         }
-    }
-}
-
-/// A prefab without parts, with an empty asset behind every id that the project knows.
-fn placeholder(record: &PrefabRecord, source: std::path::PathBuf) -> PrefabPackage {
-    let mut prefab = Prefab::new(record.name.clone(), source);
-    prefab.missing = true;
-    prefab.meshes.clone_from(&record.meshes);
-    prefab.materials.clone_from(&record.materials);
-    prefab.textures.clone_from(&record.textures);
-    let named = |id: u64| format!("missing {id}");
-    let empty = Arc::new(MeshData::default());
-    let mesh = |id: u64| Mesh::new(named(id), Arc::clone(&empty), Vec::new());
-    let material = |id: u64| {
-        let value = Material { name: named(id), ..Material::default() };
-        MaterialEntry { original: Some(value.clone()), value }
-    };
-    PrefabPackage {
-        id: record.id,
-        meshes: record.meshes.iter().map(|&id| (id, mesh(id.0))).collect(),
-        materials: record.materials.iter().map(|&id| (id, material(id.0))).collect(),
-        textures: record.textures.iter().map(|&id| (id, import::placeholder_texture(named(id.0)))).collect(),
-        prefab,
     }
 }

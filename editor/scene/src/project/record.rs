@@ -1,5 +1,5 @@
 //! What stands in a project file, field by field. Each record keeps the fields that it does not know.
-//! Knows JSON and the values of the document, not the document.
+//! Knows JSON and the values of the document, not the document. Prefabs and meshes are in `record/assets.rs`.
 
 use std::collections::BTreeMap;
 
@@ -7,17 +7,23 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::paths::absolute_text;
 use crate::animation::ClipChoice;
-use crate::assets::{Camera, Light, Material, ShapeSource};
-use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, TextureId};
-use crate::node::RayVisibility;
+use crate::assets::{Camera, Environment, EnvironmentFile, Light, Material};
+use crate::ids::{MaterialId, MeshId, NodeId, PrefabId};
+use crate::node::{Node, NodeKind, RayVisibility, Subtree};
 use crate::prefab::{PartOverride, PartPath};
 use crate::transform::{Local, Trs};
+
+mod assets;
+
+pub(crate) use assets::PackageRecord;
+pub(super) use assets::{PrefabRecord, ShapeMeshRecord, placeholder};
 
 /// The whole file.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct ProjectRecord {
+pub(crate) struct ProjectRecord {
     /// Version of the format.
     pub caustica: u64,
     #[serde(default)]
@@ -64,26 +70,8 @@ impl ProjectRecord {
     }
 }
 
-/// A prefab: its file and the ids of what it brings, in the order of the file.
 #[derive(Serialize, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct PrefabRecord {
-    pub id: PrefabId,
-    pub name: String,
-    /// Relative to the project, with forward slashes.
-    pub source: String,
-    #[serde(default)]
-    pub meshes: Vec<MeshId>,
-    #[serde(default)]
-    pub materials: Vec<MaterialId>,
-    #[serde(default)]
-    pub textures: Vec<TextureId>,
-    #[serde(flatten)]
-    pub other: Map<String, Value>,
-}
-
-#[derive(Serialize, Deserialize)]
-pub(super) struct MaterialRecord {
+pub(crate) struct MaterialRecord {
     pub id: MaterialId,
     pub value: Material,
     #[serde(flatten)]
@@ -92,28 +80,24 @@ pub(super) struct MaterialRecord {
 
 /// A mesh of spheres and boxes: how they are made, never the shapes themselves.
 #[derive(Serialize, Deserialize)]
-pub(super) struct ShapesRecord {
+pub(crate) struct ShapesRecord {
     pub id: MeshId,
-    pub name: String,
-    /// The path of a file is relative to the project, with forward slashes.
-    pub source: ShapeSource,
-    /// One a primitive.
-    #[serde(default)]
-    pub materials: Vec<MaterialId>,
+    #[serde(flatten)]
+    pub mesh: ShapeMeshRecord,
     #[serde(flatten)]
     pub other: Map<String, Value>,
 }
 
 /// The primitives of a mesh that were moved: index to `mesh_from_primitive`, column by column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct MeshRecord {
+pub(crate) struct MeshRecord {
     pub id: MeshId,
     pub primitives: BTreeMap<u32, [f64; 12]>,
 }
 
 /// The chosen camera: a node, or a part of the instance by its path.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct CameraRecord {
+pub(crate) struct CameraRecord {
     pub node: NodeId,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub part: Option<PartPath>,
@@ -121,7 +105,7 @@ pub(super) struct CameraRecord {
 
 #[derive(Default, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "camelCase")]
-pub(super) enum EnvironmentRecord {
+pub(crate) enum EnvironmentRecord {
     #[default]
     Auto,
     Sky,
@@ -136,6 +120,33 @@ pub(super) enum EnvironmentRecord {
         #[serde(default = "one")]
         scale: f32,
     },
+}
+
+impl From<Environment> for EnvironmentRecord {
+    fn from(environment: Environment) -> Self {
+        match environment {
+            Environment::Auto => Self::Auto,
+            Environment::DefaultSky => Self::Sky,
+            Environment::Constant(radiance) => Self::Constant { radiance },
+            Environment::File(EnvironmentFile { path, rotation_rad, scale, .. }) => {
+                Self::File { path: absolute_text(&path), rotation_rad, scale }
+            }
+        }
+    }
+}
+
+/// Without the map of a file, which is still to be read.
+impl From<EnvironmentRecord> for Environment {
+    fn from(record: EnvironmentRecord) -> Self {
+        match record {
+            EnvironmentRecord::Auto => Self::Auto,
+            EnvironmentRecord::Sky => Self::DefaultSky,
+            EnvironmentRecord::Constant { radiance } => Self::Constant(radiance),
+            EnvironmentRecord::File { path, rotation_rad, scale } => {
+                Self::File(EnvironmentFile { path: path.into(), rotation_rad, scale, map: None })
+            }
+        }
+    }
 }
 
 fn one() -> f32 {
@@ -157,7 +168,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 /// A node; which of `prefab`, `mesh`, `light` and `camera` is there says what it is, none: a group.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct NodeRecord {
+pub(crate) struct NodeRecord {
     pub id: NodeId,
     pub name: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -195,9 +206,90 @@ pub(super) struct NodeRecord {
     pub other: Map<String, Value>,
 }
 
+impl NodeRecord {
+    pub fn of(id: NodeId, node: &Node) -> Self {
+        let mut record = Self {
+            id,
+            name: node.name.clone(),
+            parent: node.parent,
+            local: node.local.into(),
+            visible: node.visible,
+            locked: node.locked,
+            ray_visibility: node.ray_visibility,
+            prefab: None,
+            overrides: BTreeMap::new(),
+            clip: ClipChoice::default(),
+            variant: None,
+            mesh: None,
+            materials: Vec::new(),
+            weights: Vec::new(),
+            light: None,
+            camera: None,
+            other: Map::new(),
+        };
+        match &node.kind {
+            NodeKind::Group => {}
+            NodeKind::Prefab { prefab, overrides, clip, variant } => {
+                record.prefab = Some(*prefab);
+                record.variant.clone_from(variant);
+                record.clip = *clip;
+                let overrides = overrides.iter();
+                record.overrides = overrides
+                    .map(|(path, value)| (path.clone(), OverrideRecord::from(value.clone())))
+                    .collect();
+            }
+            NodeKind::Mesh { mesh, materials, weights } => {
+                record.mesh = Some(*mesh);
+                record.weights.clone_from(weights);
+                record.materials.clone_from(materials);
+            }
+            NodeKind::Light(light) => record.light = Some(*light),
+            NodeKind::Camera(camera) => record.camera = Some(*camera),
+        }
+        record
+    }
+
+    /// The node, without children.
+    pub fn into_node(self) -> (NodeId, Node) {
+        let kind = match self {
+            Self { prefab: Some(prefab), overrides, clip, variant, .. } => NodeKind::Prefab {
+                prefab,
+                clip,
+                variant,
+                overrides: overrides.into_iter().map(|(path, value)| (path, value.into())).collect(),
+            },
+            Self { mesh: Some(mesh), materials, weights, .. } => NodeKind::Mesh { mesh, materials, weights },
+            Self { light: Some(light), .. } => NodeKind::Light(light),
+            Self { camera: Some(camera), .. } => NodeKind::Camera(camera),
+            _ => NodeKind::Group,
+        };
+        let node = Node {
+            parent: self.parent,
+            visible: self.visible,
+            locked: self.locked,
+            ray_visibility: self.ray_visibility,
+            local: self.local.into(),
+            ..Node::new(self.name, kind)
+        };
+        (self.id, node)
+    }
+}
+
+impl From<Subtree> for Vec<NodeRecord> {
+    fn from(subtree: Subtree) -> Self {
+        subtree.nodes.iter().map(|(id, node)| NodeRecord::of(*id, node)).collect()
+    }
+}
+
+impl From<Vec<NodeRecord>> for Subtree {
+    fn from(records: Vec<NodeRecord>) -> Self {
+        Self { nodes: records.into_iter().map(NodeRecord::into_node).collect() }
+    }
+}
+
 /// A matrix, column by column, or translation, rotation (x, y, z, w) and scale.
 #[derive(Clone, Serialize, Deserialize)]
-pub(super) struct LocalRecord {
+pub(crate) struct LocalRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix: Option<[f64; 12]>,
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -270,7 +362,7 @@ impl From<LocalRecord> for Local {
 /// What an instance says differently about a part.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct OverrideRecord {
+pub(crate) struct OverrideRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -9,15 +9,14 @@ use serde_json::{Map, Value};
 
 use super::paths::to_relative;
 use super::record::{
-    CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, OverrideRecord, PrefabRecord,
-    ProjectRecord, ShapesRecord,
+    CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, PrefabRecord, ProjectRecord,
+    ShapeMeshRecord, ShapesRecord,
 };
 use super::{ProjectMeta, SCHEMA_VERSION};
-use crate::animation::ClipChoice;
-use crate::assets::{Environment, Mesh, ShapeFile, ShapeSource};
+use crate::assets::{Environment, Mesh};
 use crate::document::Document;
-use crate::ids::{MeshId, NodeId};
-use crate::node::{Node, NodeKind};
+use crate::edit::Edit;
+use crate::ids::MeshId;
 
 /// The text of a project that will stand at `path`.
 pub(super) fn to_text(
@@ -25,36 +24,66 @@ pub(super) fn to_text(
     document: &Document,
     meta: &ProjectMeta,
 ) -> Result<String, serde_json::Error> {
-    let record = ProjectRecord {
+    let relative = |file: &Path| to_relative(path, file);
+    serde_json::to_string_pretty(&record_of(relative, document, meta)).map(|text| text + "\n")
+}
+
+/// What a project says; `name` writes the paths of files.
+pub(super) fn record_of(
+    name: impl Fn(&Path) -> String,
+    document: &Document,
+    meta: &ProjectMeta,
+) -> ProjectRecord {
+    ProjectRecord {
         caustica: SCHEMA_VERSION,
         next_id: document.next_id(),
-        prefabs: prefabs(path, document, meta),
+        prefabs: prefabs(&name, document, meta),
         materials: materials(document, meta),
-        shapes: shapes(path, document, meta),
+        shapes: shapes(&name, document, meta),
         meshes: meshes(document, meta),
         nodes: nodes(document, meta),
-        environment: environment(path, document),
+        environment: environment(&name, document),
         camera: camera(document, meta),
         view: meta.view.clone(),
         render: meta.render.clone(),
         other: meta.kept.top.clone(),
-    };
-    serde_json::to_string_pretty(&record).map(|text| text + "\n")
+    }
+}
+
+/// Edits that add what is in a document, but not in its record, because nothing uses it: undo may bring it back.
+pub(super) fn left_out(document: &Document) -> Vec<Edit> {
+    let is_written = written_meshes(document);
+    let left = document.meshes().filter(|(id, mesh)| !is_written(*id, mesh));
+    left.flat_map(|(mesh, value)| {
+        let mut value = value.clone();
+        let mut edits = Vec::new();
+        for (primitive, slot) in (0..).zip(&mut value.primitives) {
+            let mesh_from_primitive = std::mem::take(&mut slot.mesh_from_primitive);
+            if mesh_from_primitive != DAffine3::IDENTITY {
+                edits.push(Edit::SetPrimitiveTransform { mesh, primitive, mesh_from_primitive });
+            }
+        }
+        value.update_bounds();
+        std::iter::once(Edit::AddMesh { mesh, value: Box::new(value) }).chain(edits)
+    })
+    .collect()
+}
+
+/// Whether a mesh is in the record: those of prefabs are, and spheres and boxes that are placed. A mesh of them whose nodes are
+/// gone is there for undo alone.
+fn written_meshes(document: &Document) -> impl Fn(MeshId, &Mesh) -> bool {
+    let placed: BTreeSet<_> = document.nodes().filter_map(|(id, _)| document.mesh_of(id.into())).collect();
+    move |id, mesh| mesh.shapes().is_none() || placed.contains(&id)
 }
 
 fn kept(map: &BTreeMap<u64, Map<String, Value>>, id: u64) -> Map<String, Value> {
     map.get(&id).cloned().unwrap_or_default()
 }
 
-fn prefabs(path: &Path, document: &Document, meta: &ProjectMeta) -> Vec<PrefabRecord> {
-    let record = |(id, prefab): (_, &crate::prefab::Prefab)| PrefabRecord {
-        id,
-        name: prefab.name.clone(),
-        source: to_relative(path, &prefab.source),
-        meshes: prefab.meshes.clone(),
-        materials: prefab.materials.clone(),
-        textures: prefab.textures.clone(),
+fn prefabs(name: impl Fn(&Path) -> String, document: &Document, meta: &ProjectMeta) -> Vec<PrefabRecord> {
+    let record = |(id, prefab): (crate::PrefabId, &crate::Prefab)| PrefabRecord {
         other: kept(&meta.kept.prefabs, id.0),
+        ..PrefabRecord::of(id, prefab, name(&prefab.source))
     };
     document.prefabs().map(record).collect()
 }
@@ -75,103 +104,42 @@ fn materials(document: &Document, meta: &ProjectMeta) -> Vec<MaterialRecord> {
         .collect()
 }
 
-/// Only those that are placed: a mesh whose nodes are gone is there for undo alone.
-fn shapes(path: &Path, document: &Document, meta: &ProjectMeta) -> Vec<ShapesRecord> {
-    let placed: BTreeSet<_> = document.nodes().filter_map(|(id, _)| document.mesh_of(id.into())).collect();
+fn shapes(name: impl Fn(&Path) -> String, document: &Document, meta: &ProjectMeta) -> Vec<ShapesRecord> {
+    let is_written = written_meshes(document);
     let record = |(id, mesh): (MeshId, &Mesh)| {
-        let source = match mesh.shapes()?.source().clone() {
-            ShapeSource::File(file) => {
-                ShapeSource::File(ShapeFile { path: to_relative(path, &file.path).into(), ..file })
-            }
-            other => other,
-        };
-        let materials = mesh.primitives.iter().map(|primitive| primitive.material).collect();
-        Some(ShapesRecord {
-            id,
-            name: mesh.name.clone(),
-            source,
-            materials,
-            other: kept(&meta.kept.shapes, id.0),
-        })
+        let mesh = ShapeMeshRecord::of(mesh, &name)?;
+        Some(ShapesRecord { id, mesh, other: kept(&meta.kept.shapes, id.0) })
     };
-    document.meshes().filter(|(id, _)| placed.contains(id)).filter_map(record).collect()
+    document.meshes().filter(|(id, mesh)| is_written(*id, mesh)).filter_map(record).collect()
 }
 
 fn meshes(document: &Document, meta: &ProjectMeta) -> Vec<MeshRecord> {
     let mut records: BTreeMap<_, _> =
         meta.kept.meshes.iter().map(|record| (record.id, record.clone())).collect();
-    for (id, mesh) in document.meshes() {
-        let moved: BTreeMap<u32, [f64; 12]> = mesh
-            .primitives
-            .iter()
-            .enumerate()
-            .filter(|(_, primitive)| primitive.mesh_from_primitive != DAffine3::IDENTITY)
-            .map(|(index, p)| (index as u32, p.mesh_from_primitive.to_cols_array()))
-            .collect();
-        if !moved.is_empty() {
-            let primitives = moved;
-            records.insert(id, MeshRecord { id, primitives });
-        }
-    }
+    let is_written = written_meshes(document);
+    let written = document.meshes().filter(|(id, mesh)| is_written(*id, mesh));
+    let moved = written.filter_map(|(id, mesh)| MeshRecord::of(id, mesh));
+    records.extend(moved.map(|record| (record.id, record)));
     records.into_values().collect()
 }
 
 fn nodes(document: &Document, meta: &ProjectMeta) -> Vec<NodeRecord> {
     let ids = document.roots().iter().flat_map(|&root| document.subtree_ids(root));
-    ids.filter_map(|id| Some(node(id, document.node(id)?, meta))).collect()
+    ids.filter_map(|id| {
+        let record = NodeRecord::of(id, document.node(id)?);
+        Some(NodeRecord { other: kept(&meta.kept.nodes, id.0), ..record })
+    })
+    .collect()
 }
 
-fn node(id: NodeId, node: &Node, meta: &ProjectMeta) -> NodeRecord {
-    let mut record = NodeRecord {
-        id,
-        name: node.name.clone(),
-        parent: node.parent,
-        local: node.local.into(),
-        visible: node.visible,
-        locked: node.locked,
-        ray_visibility: node.ray_visibility,
-        prefab: None,
-        overrides: BTreeMap::new(),
-        clip: ClipChoice::default(),
-        variant: None,
-        mesh: None,
-        materials: Vec::new(),
-        weights: Vec::new(),
-        light: None,
-        camera: None,
-        other: kept(&meta.kept.nodes, id.0),
-    };
-    match &node.kind {
-        NodeKind::Group => {}
-        NodeKind::Prefab { prefab, overrides, clip, variant } => {
-            record.prefab = Some(*prefab);
-            record.variant.clone_from(variant);
-            record.clip = *clip;
-            let overrides = overrides.iter();
-            record.overrides =
-                overrides.map(|(path, value)| (path.clone(), OverrideRecord::from(value.clone()))).collect();
-        }
-        NodeKind::Mesh { mesh, materials, weights } => {
-            record.mesh = Some(*mesh);
-            record.weights.clone_from(weights);
-            record.materials.clone_from(materials);
-        }
-        NodeKind::Light(light) => record.light = Some(*light),
-        NodeKind::Camera(camera) => record.camera = Some(*camera),
-    }
-    record
-}
-
-fn environment(path: &Path, document: &Document) -> EnvironmentRecord {
+fn environment(name: impl Fn(&Path) -> String, document: &Document) -> EnvironmentRecord {
     match document.environment() {
-        Environment::Auto => EnvironmentRecord::Auto,
-        Environment::DefaultSky => EnvironmentRecord::Sky,
-        Environment::Constant(radiance) => EnvironmentRecord::Constant { radiance: *radiance },
         Environment::File(file) => EnvironmentRecord::File {
-            path: to_relative(path, &file.path),
+            path: name(&file.path),
             rotation_rad: file.rotation_rad,
             scale: file.scale,
         },
+        other => other.clone().into(),
     }
 }
 

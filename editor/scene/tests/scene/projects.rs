@@ -2,6 +2,7 @@
 
 use crate::animation::morphed;
 use crate::common::{ARM, LAMP, PLATE, Scene, scene, trs};
+use caustica_scene::import::ImportOptions;
 use caustica_scene::{
     ClipChoice, Edit, Environment, Local, Material, MaterialEntry, MaterialId, Project, ProjectMeta,
     ProjectProblem, Target, Trs,
@@ -10,7 +11,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use serde_json::{Value, json};
 
 /// A scene with every kind of thing that a project keeps.
-fn edited(folder: &std::path::Path) -> Scene {
+pub fn edited(folder: &std::path::Path) -> Scene {
     let mut scene = scene(folder);
     let mut shear = DAffine3::from_translation(DVec3::new(0.1 + 0.2, -0.0, 1e300));
     shear.matrix3.y_axis.x = 0.3;
@@ -52,7 +53,7 @@ fn edited(folder: &std::path::Path) -> Scene {
     scene
 }
 
-fn meta() -> ProjectMeta {
+pub fn meta() -> ProjectMeta {
     let mut meta = ProjectMeta::default();
     meta.view.insert("exposure".into(), json!(1.5));
     meta.render.insert("z".into(), json!({"b": 1, "a": [1, 2]}));
@@ -90,8 +91,12 @@ fn morph_weights_are_saved_and_a_time_is_not() {
     }
     document.set_time(Some(0.3));
     Project::save(&path, &document, &meta()).unwrap();
-    let project = Project::load(&path).unwrap();
-    assert!(project.warnings.is_empty(), "{:?}", project.warnings);
+    // The model is another's and lies elsewhere.
+    let refused = Project::load(&path).unwrap();
+    assert_eq!(refused.outside.len(), 1);
+    let options = ImportOptions { outside_project: true, ..ImportOptions::default() };
+    let project = Project::load_with_progress(&path, &options, &|_, _| ()).unwrap();
+    assert!(project.warnings.is_empty() && project.outside.is_empty(), "{:?}", project.warnings);
     assert!(project.document == document);
     assert_eq!(project.document.time(), None);
     let weights = |target| project.document.deform_pose(target).unwrap().weights;
@@ -202,7 +207,7 @@ fn other_files_and_newer_versions_are_refused_in_words() {
     assert!(matches!(load(twice).problem, ProjectProblem::Broken(_)));
     let orphan = r#"{"caustica":1,"nodes":[{"id":1,"name":"a","parent":7}]}"#;
     assert!(load(orphan).to_string().contains("node 1"));
-    let typed = load("{\"caustica\":1,\n\"nodes\":[{\"id\":\"x\"}]}");
+    let typed = load("{\"caustica\":2,\n\"nodes\":[{\"id\":\"x\"}]}");
     assert!(typed.to_string().contains("line 2"), "{typed}");
 }
 

@@ -142,7 +142,7 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
     let options =
         SessionOptions { shaders: bench.shaders.clone(), extent: extent_px, ..SessionOptions::default() };
     let mut session = Session::new(&bench.device, options)?;
-    session.open(&args.project, load(&args.project, &|_, _| ())?)?;
+    session.open(&args.project, load(&args.project, false, &|_, _| ())?)?;
     let of_project =
         ViewSettings { pipeline: Pipeline::Hybrid, temporal: false, ..session.settings().clone() };
     let bar = bench.bar("hybrid", VARIANTS.len() * rounds as usize + 1);

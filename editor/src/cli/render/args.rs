@@ -8,7 +8,7 @@ use caustica_renderer::{
 use clap::{ArgGroup, Args, ValueEnum};
 use serde_json::json;
 
-use crate::cli::output;
+use crate::cli::{SourceArgs, output};
 
 /// Arguments of `caustica render`.
 #[derive(Args, Debug)]
@@ -16,6 +16,8 @@ use crate::cli::output;
 pub(in crate::cli) struct RenderArgs {
     /// A project, .gltf, .glb or .obj
     pub(super) file: PathBuf,
+    #[command(flatten)]
+    pub(super) sources: SourceArgs,
     /// Where the image goes: .png (tone mapped) or .exr (radiance)
     #[arg(short, long, value_name = "OUT", value_parser = parse_output)]
     pub(super) output: PathBuf,

@@ -1,0 +1,172 @@
+//! Questions about what a project or another run has left: unsaved changes, and files outside of the project's folder.
+//! Enters: what was found. Leaves: a recovered scene, read on a worker, or files that stay as they are.
+
+use std::path::Path;
+
+use caustica_scene::import::ImportOptions;
+use caustica_scene::{JournalError, LeftBehind, Recovered};
+use egui::{Align, Context, Id, Layout, Modal, Ui};
+
+use super::editor::Editor;
+use super::files::{Purpose, short};
+use crate::recovery::{describe, left_behind};
+use crate::worker::{Answer, Job, Progress};
+
+/// Most files that a question lists.
+const MOST_LISTED: usize = 6;
+
+/// Unsaved changes that are being read.
+pub(super) struct Recovering {
+    job: Job<Result<Recovered, JournalError>>,
+}
+
+impl Recovering {
+    /// What is going on and how far, for the progress bar.
+    pub(super) fn progress(&self) -> (String, Progress) {
+        (self.job.label().to_owned(), self.job.progress())
+    }
+}
+
+impl Editor {
+    /// Looks for unsaved changes that other runs have left behind, and asks about them.
+    pub fn ask_about_left_behind(&mut self) {
+        self.later.clear();
+        self.left_behind = left_behind();
+        for left in &self.left_behind {
+            tracing::info!("left behind: {}", describe(left));
+        }
+    }
+
+    /// Asks about unsaved changes of a project that was just opened, unless the user wants to hear of them later.
+    pub(super) fn ask_about_left_behind_of(&mut self, project: &Path) {
+        if self.left_behind.is_empty() {
+            let project = std::path::absolute(project).unwrap_or_else(|_| project.to_owned());
+            self.left_behind = left_behind();
+            self.left_behind
+                .retain(|left| left.project() == Some(&project) && !self.later.contains(left.path()));
+        }
+    }
+
+    pub(super) fn ask_to_recover(&mut self, context: &Context) {
+        let Some(first) = self.left_behind.first() else { return };
+        let (what, others) = (describe(first), self.left_behind.len() - 1);
+        let [recover, discard, later] = ["Recover", "Discard", "Later"];
+        let heading = "Recover unsaved changes?";
+        let answer = ask(context, heading, [recover, discard, later], recover, |ui| {
+            ui.label("The program ended before these changes were saved:");
+            ui.add_space(4.0);
+            ui.strong(what);
+            if others > 0 {
+                ui.weak(format!("and {others} more, which are asked about next"));
+            }
+        });
+        if answer == Some(recover) {
+            let left = self.left_behind.remove(0);
+            self.postpone_left_behind();
+            self.start_recovering(left);
+        } else if answer == Some(discard) {
+            self.left_behind.remove(0).discard();
+        } else if answer == Some(later) {
+            self.postpone_left_behind();
+        }
+    }
+
+    fn postpone_left_behind(&mut self) {
+        self.later.extend(self.left_behind.drain(..).map(|left| left.path().to_owned()));
+    }
+
+    fn start_recovering(&mut self, left: LeftBehind) {
+        // What was about to be opened would take the place of what is recovered.
+        self.loading = None;
+        self.waiting.clear();
+        self.outside = None;
+        let path = left.path().to_owned();
+        let work = move |progress: &dyn Fn(&str, f32)| left.recover(&ImportOptions::default(), progress);
+        match Job::start("Recovering unsaved changes", self.wake.clone(), work) {
+            Ok(job) => self.recovering = Some(Recovering { job }),
+            Err(error) => self.state.toasts.error(format!("{} cannot be read: {error}.", path.display())),
+        }
+    }
+
+    /// Takes over what was recovered.
+    pub(super) fn poll_recovering(&mut self) {
+        let Some(recovering) = self.recovering.take() else { return };
+        match recovering.job.poll() {
+            Answer::Running => self.recovering = Some(recovering),
+            Answer::Done(Ok(recovered)) => {
+                let (steps, warnings) = (recovered.steps.len(), recovered.project.warnings.len());
+                recovered.project.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+                match self.session.recover(recovered) {
+                    Ok(()) => {
+                        self.new_scene_shown();
+                        self.tell(format!("Recovered {steps} unsaved edits; save to keep them"), warnings);
+                    }
+                    Err(error) => self.state.toasts.error(format!("Nothing was recovered: {error:#}.")),
+                }
+            }
+            Answer::Done(Err(error)) => {
+                self.state
+                    .toasts
+                    .error(format!("The unsaved changes cannot be read, and stay where they are: {error}."));
+            }
+            Answer::Died => {
+                let message = "Reading the unsaved changes failed in a way that was not foreseen; they stay where they are.";
+                self.state.toasts.error(message);
+            }
+        }
+    }
+
+    pub(super) fn ask_about_outside(&mut self, context: &Context) {
+        let Some((project, files)) = &self.outside else { return };
+        let [read, leave] = ["Read them", "Leave them out"];
+        let heading = "Read files outside of the project's folder?";
+        let answer = ask(context, heading, [read, leave], leave, |ui| {
+            ui.label(format!("{} names these files. Read them if you trust who made it:", short(project)));
+            ui.add_space(4.0);
+            for file in files.iter().take(MOST_LISTED) {
+                ui.strong(file.display().to_string());
+            }
+            if files.len() > MOST_LISTED {
+                ui.weak(format!("and {} more", files.len() - MOST_LISTED));
+            }
+        });
+        if answer.is_some()
+            && let Some((project, _)) = self.outside.take()
+            && answer == Some(read)
+        {
+            self.state.config.trust(&project);
+            self.load(Purpose::Open, project);
+        }
+    }
+}
+
+/// A question in the middle of the window, the first answer at the right. The last one is also what Esc says, and Enter says
+/// the `default`.
+fn ask<const N: usize>(
+    context: &Context,
+    heading: &str,
+    answers: [&'static str; N],
+    default: &str,
+    body: impl FnOnce(&mut Ui),
+) -> Option<&'static str> {
+    let mut answer = None;
+    let modal = Modal::new(Id::new(heading)).show(context, |ui| {
+        ui.set_width(420.0);
+        ui.heading(heading);
+        ui.add_space(8.0);
+        body(ui);
+        ui.add_space(16.0);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            for text in answers {
+                let button = ui.button(text);
+                if text == default && context.memory(|memory| memory.focused().is_none()) {
+                    button.request_focus();
+                }
+                if button.clicked() {
+                    answer = Some(text);
+                }
+            }
+        });
+    });
+    answer.or_else(|| if modal.should_close() { answers.last().copied() } else { None })
+}

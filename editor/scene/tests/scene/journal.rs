@@ -243,40 +243,53 @@ fn a_living_process_keeps_its_journal_and_saving_ends_it() {
 
 #[test]
 fn a_project_that_has_changed_since_is_noticed() {
+    for saves in [1, 2] {
+        let root = tempfile::tempdir().unwrap();
+        let scene = scene(root.path());
+        let (mut kept, path) = Kept::saved(root.path(), scene.document.clone());
+        let rename = |target, name: &str| Edit::Rename { target, name: name.into() };
+        kept.push(rename(scene.first.into(), "mine"));
+        kept.push(rename(scene.second.into(), "mine too"));
+        let (mut expected, folder) = kept.die();
+        // Another process saves: once, and the backup is what the edits follow.
+        let mut other = scene.document.clone();
+        other.apply(Edit::RemoveNode { node: scene.second }).unwrap();
+        for _ in 0..saves {
+            Project::save(&path, &other, &ProjectMeta::default()).unwrap();
+        }
+        let recovered = recover(&folder);
+        let texts: Vec<String> = recovered.project.warnings.iter().map(ToString::to_string).collect();
+        assert!(texts.iter().any(|text| text.contains("has changed since")), "{texts:?}");
+        // Twice, and what fits is applied to what is there.
+        assert_eq!(texts.iter().any(|text| text.contains("does not fit")), saves == 2, "{texts:?}");
+        if saves == 2 {
+            expected = other;
+            expected.apply(rename(scene.first.into(), "mine")).unwrap();
+        }
+        assert!(recovered.project.document == expected);
+        let asks = recovered.path.is_none() && !recovered.base_is_saved;
+        assert!(asks, "saving must not replace the other's work unasked");
+        drop(recovered);
+        // From now on the file does not matter.
+        std::fs::remove_file(&path).unwrap();
+        assert!(recover(&folder).project.document == expected);
+    }
+}
+
+#[test]
+fn unsaved_changes_stay_when_their_project_is_gone() {
     let root = tempfile::tempdir().unwrap();
     let scene = scene(root.path());
     let (mut kept, path) = Kept::saved(root.path(), scene.document.clone());
-    let rename = |target, name: &str| Edit::Rename { target, name: name.into() };
-    kept.push(rename(scene.first.into(), "mine"));
-    kept.push(rename(scene.second.into(), "mine too"));
+    kept.push(Edit::Rename { target: scene.first.into(), name: "mine".into() });
     let (document, folder) = kept.die();
-    let save = |other: &Document| Project::save(&path, other, &ProjectMeta::default()).unwrap();
-    // Another process saves once: the backup is what the edits follow.
-    let mut other = scene.document.clone();
-    other.apply(Edit::RemoveNode { node: scene.second }).unwrap();
-    save(&other);
-    let recovered = recover(&folder);
-    assert!(recovered.project.document == document);
-    assert!(
-        recovered.path.is_none() && !recovered.base_is_saved,
-        "saving must not replace the other's work unasked"
-    );
-    drop(recovered);
-    // Twice: what fits is applied to what is there, and the rest is told of.
-    save(&other);
-    let recovered = recover(&folder);
-    other.apply(rename(scene.first.into(), "mine")).unwrap();
-    assert!(recovered.project.document == other);
-    let texts: Vec<String> = recovered.project.warnings.iter().map(ToString::to_string).collect();
-    assert!(texts.iter().any(|text| text.contains("has changed since")), "{texts:?}");
-    assert!(texts.iter().any(|text| text.contains("does not fit")), "{texts:?}");
-    drop(recovered);
-    // Gone: nothing to apply them to, and they stay.
-    std::fs::remove_file(&path).unwrap();
-    std::fs::remove_file(root.path().join("scene.caustica.json.bak")).unwrap();
+    let hidden = root.path().join("hidden");
+    std::fs::rename(&path, &hidden).unwrap();
     let left = LeftBehind::find(&folder).remove(0);
-    assert!(left.recover(&ImportOptions::default(), &|_, _| ()).is_err());
-    assert_eq!(LeftBehind::find(&folder).len(), 1);
+    let error = left.recover(&ImportOptions::default(), &|_, _| ()).unwrap_err();
+    assert_eq!(error.file, path);
+    std::fs::rename(&hidden, &path).unwrap();
+    assert!(recover(&folder).project.document == document);
 }
 
 #[test]

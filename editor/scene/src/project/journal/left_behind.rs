@@ -176,7 +176,12 @@ impl LeftBehind {
         let steps = replay(&mut loader, left_out, contents.edits);
         let recovered = loader.finish("recovered", base.file);
         let journal = Journal::resume(self.file, &self.path, len, project.clone(), self.refused);
-        let journal = journal.map_err(|error| fail(error.into()))?;
+        let mut journal = journal.map_err(|error| fail(error.into()))?;
+        if !base.is_as_it_was {
+            // The next save replaces what the edits follow: from now on they need nothing but themselves.
+            let kept = journal.keep_scene(&recovered.document, &recovered.meta);
+            kept.map_err(|error| fail(error.into()))?;
+        }
         let path = project.filter(|_| base.is_as_it_was);
         let base_is_saved = path.is_some() && !is_scene;
         Ok(Recovered { project: recovered, path, base_is_saved, steps, journal })

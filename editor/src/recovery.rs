@@ -24,7 +24,9 @@ pub fn unsaved_changes_of(project: &Path) -> Vec<String> {
     let project = std::path::absolute(project).unwrap_or_else(|_| project.to_owned());
     let left_behind = left_behind();
     let of_project = left_behind.iter().filter(|left| left.project() == Some(&project));
-    of_project.map(|left| format!("{}; open it in the editor to recover them", describe(left))).collect()
+    of_project
+        .map(|left| format!("{}; the editor asks whether to recover what is unsaved", describe(left)))
+        .collect()
 }
 
 /// Such as "room.caustica.json: 12 unsaved edits, 3 minutes ago".

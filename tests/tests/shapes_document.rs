@@ -112,7 +112,7 @@ fn even_and_odd_shapes_are_two_primitives_and_there_may_be_none() {
 fn the_projects_open_without_a_finding() {
     for (project, shapes) in [("cloud/cloud", 2_000_000), ("five-stages/five-stages", 4003)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../projects/{project}.caustica.json"));
-        let loaded = load(&path, &|_, _| {}).expect("a project");
+        let loaded = load(&path, false, &|_, _| {}).expect("a project");
         let caustica::session::Loaded::Project(read) = loaded else { unreachable!("it is a project") };
         assert_eq!(read.warnings, [], "{project}");
         let findings = audit(&read.document);

@@ -258,12 +258,12 @@ fn what_a_killed_editor_had_not_saved_is_recovered() {
     let mut editor = Editor::open(&desktop, folder.path(), &cube(false));
     desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", MIDDLE[0], MIDDLE[1]));
     editor.wait_for("the outline of the cube", 30, |desktop| outline(&desktop.screenshot()));
-    desktop.xdotool("key Delete");
+    desktop.xdotool("key h");
     let window = editor.window.clone();
     let is_modified = move |desktop: &Desktop| {
         desktop.xdotool(&format!("getwindowname {window}")).contains('\u{2022}').then_some(())
     };
-    editor.wait_for("the cube to go", 30, is_modified);
+    editor.wait_for("the cube to be hidden", 30, is_modified);
     editor.process.kill().expect("a signal that nothing can catch");
     editor.process.wait().expect("the end");
     drop(editor);
@@ -277,7 +277,7 @@ fn what_a_killed_editor_had_not_saved_is_recovered() {
         desktop.xdotool("key Return sleep 0.5");
         desktop.xdotool(&format!("getwindowname {window}")).contains('\u{2022}').then_some(())
     });
-    assert!(!shows_cube(&settled(&mut again)), "it was deleted");
+    assert!(!shows_cube(&settled(&mut again)), "it was hidden");
     // What was done before the end can be undone after it.
     desktop.xdotool("key ctrl+z");
     again.wait_for("undo to bring the cube back", 30, |desktop| {

@@ -94,12 +94,12 @@ impl Editor {
         match recovering.job.poll() {
             Answer::Running => self.recovering = Some(recovering),
             Answer::Done(Ok(recovered)) => {
-                let (steps, warnings) = (recovered.steps.len(), recovered.project.warnings.len());
+                let warnings = recovered.project.warnings.len();
                 recovered.project.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
                 match self.session.recover(recovered) {
                     Ok(()) => {
                         self.new_scene_shown();
-                        self.tell(format!("Recovered {steps} unsaved edits; save to keep them"), warnings);
+                        self.tell("Recovered the unsaved changes; save to keep them".to_owned(), warnings);
                     }
                     Err(error) => self.state.toasts.error(format!("Nothing was recovered: {error:#}.")),
                 }

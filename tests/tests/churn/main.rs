@@ -102,7 +102,7 @@ fn sky(folder: &Path) -> Environment {
 
 /// An instance of the model on a floor below a lamp.
 fn furnish(session: &mut Session, model: &Path) {
-    session.import(model, load(model, &|_, _| {}).expect("the model")).expect("an instance");
+    session.import(model, load(model, false, &|_, _| {}).expect("the model")).expect("an instance");
     let camera = ViewCamera::looking_at(DVec3::new(0.4, 1.6, 5.0), DVec3::new(0.0, 0.8, 0.0), 0.7, 0.01);
     session.set_camera(camera);
     let plate = session.document().meshes().find(|(_, mesh)| mesh.name == "Plate").expect("the plate").0;
@@ -224,7 +224,7 @@ fn compare_with_fresh_load(gpu: &gpu::Session, session: &mut Session, folder: &P
     let path = folder.join("churned.caustica.json");
     session.save(&path).expect("a project");
     let mut fresh = new_session(gpu, NeedsMode::Auto, None);
-    fresh.open(&path, load(&path, &|_, _| {}).expect("the project")).expect("a document");
+    fresh.open(&path, load(&path, true, &|_, _| {}).expect("the project")).expect("a document");
     fresh.set_camera(*session.camera());
     fresh.set_time(session.document().time());
     assert!(*fresh.document() == *session.document(), "the project holds another document");

@@ -65,7 +65,7 @@ fn moving_a_node_costs_its_subtree() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("wide.caustica.json");
-    let (saved, ()) = timed(|| Project::save(&path, &document, &ProjectMeta::default()).unwrap());
+    let (saved, _) = timed(|| Project::save(&path, &document, &ProjectMeta::default()).unwrap());
     let (read, project) = timed(|| Project::load(&path).unwrap());
     assert!(project.document == document);
     println!("all saved in {saved:.1?}, read in {read:.1?}");
@@ -138,7 +138,7 @@ fn ten_thousand_levels_are_no_limit() {
     assert_eq!(bounds, None);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("deep.caustica.json");
-    let (saved, ()) = timed(|| Project::save(&path, &document, &ProjectMeta::default()).unwrap());
+    let (saved, _) = timed(|| Project::save(&path, &document, &ProjectMeta::default()).unwrap());
     let (read, project) = timed(|| Project::load(&path).unwrap());
     assert!(project.document == document);
     for (name, time) in [

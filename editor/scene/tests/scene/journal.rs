@@ -85,6 +85,8 @@ fn all_kinds(root: &Path, kept: &mut Kept, scene: &crate::common::Scene, whole: 
     let (_, copy) = document.duplicate_edit(scene.second).unwrap();
     let (again, import) = document.import_edit(crate::common::model(root));
     let reload = document.reload_edit(scene.prefab, crate::common::model(root)).unwrap();
+    let unique = document.make_unique_edit(scene.first).unwrap();
+    let (_, merged) = document.merge_edit(&document.clone(), "again").unwrap();
     let sphere = ShapeSource::Cloud(caustica_scene::Cloud { count: 5, ..Default::default() });
     let mut edits = vec![
         Edit::SetTransform { target: part, local: trs(0.1 + 0.2, 0.3, 1.0) },
@@ -92,6 +94,10 @@ fn all_kinds(root: &Path, kept: &mut Kept, scene: &crate::common::Scene, whole: 
         Edit::SetVisible { target: part, visible: false },
         Edit::SetRayVisibility { target: part, camera_visible: false, casts_shadows: true },
         Edit::SetClip { node: scene.first, clip: caustica_scene::ClipChoice::All },
+        Edit::SetVariant { node: scene.first, variant: Some("glowing".into()) },
+        Edit::SetLocked { node: scene.group, locked: true },
+        unique,
+        merged,
         Edit::AddMaterial { material: own, entry },
         Edit::AssignMaterial { target: part, primitive: 0, material: own },
         Edit::ResetOverride { target: part, field: OverrideField::Material(0) },

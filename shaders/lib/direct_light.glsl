@@ -19,11 +19,11 @@ const bool LOBE_MEETS_LIGHTS = false;
 const bool LOBE_MEETS_LIGHTS = true;
 #endif
 
-// Share of light, per channel, that comes from `origin + direction * t_max_m` to `origin`. seed: for stochastic alpha.
-vec3 light_visibility(vec3 origin, vec3 direction, float t_max_m, uint seed);
+// Share of light, per channel, that comes from `origin + direction * t_max_m` to `origin`, which lies in `medium`. seed: for stochastic alpha.
+vec3 light_visibility(Scene scene, vec3 origin, vec3 direction, float t_max_m, uint medium, uint seed);
 #ifdef SHADOWS_ARE_REMEMBERED
 // The same from punctual light number `light`, or LIGHT_UNNUMBERED, where the includer may know it without a ray.
-vec3 numbered_visibility(uint light, vec3 origin, vec3 direction, float t_max_m, uint seed);
+vec3 numbered_visibility(uint light, Scene scene, vec3 origin, vec3 direction, float t_max_m, uint medium, uint seed);
 #endif
 
 struct DirectLight {
@@ -33,6 +33,7 @@ struct DirectLight {
 
 struct Receiver {
     Surface surface;
+    uint medium;                // on the viewer's side
     mat3 render_from_local;     // z: shading normal
     vec3 v;                     // local, towards the viewer
     Brdf brdf;
@@ -57,9 +58,10 @@ bool surface_reflects(Frame frame, Surface surface) {
 // Coats below this roughness are left to the path tracer: no ray follows them here, and drawn directions seldom meet their lobe.
 const float LEAST_COAT_ROUGHNESS = 0.2;
 
-Receiver receiver_begin(Surface surface, bool lobe_traced, Sequence sequence, uint vertex, uint branch) {
+Receiver receiver_begin(Surface surface, uint medium, bool lobe_traced, Sequence sequence, uint vertex, uint branch) {
     Receiver receiver;
     receiver.surface = surface;
+    receiver.medium = medium;
     receiver.render_from_local = basis_around(surface.shading_normal);
     receiver.v = surface.view * receiver.render_from_local;
     receiver.brdf = surface_brdf(surface);
@@ -101,14 +103,14 @@ bool is_dark(DirectLight light) {
 }
 
 // Adds the light when something of it arrives; without it, no ray is traced. `number`: as for numbered_visibility.
-void add_light(inout DirectLight sum, DirectLight light, uint number, LightRay ray, uint seed) {
+void add_light(inout DirectLight sum, DirectLight light, Scene scene, uint medium, uint number, LightRay ray, uint seed) {
     if (is_dark(light)) {
         return;
     }
 #ifdef SHADOWS_ARE_REMEMBERED
-    vec3 share = numbered_visibility(number, ray.origin, ray.along, ray.t_max_m, seed);
+    vec3 share = numbered_visibility(number, scene, ray.origin, ray.along, ray.t_max_m, medium, seed);
 #else
-    vec3 share = light_visibility(ray.origin, ray.along, ray.t_max_m, seed);
+    vec3 share = light_visibility(scene, ray.origin, ray.along, ray.t_max_m, medium, seed);
 #endif
     sum.diffuse += share * light.diffuse;
     sum.specular += share * light.specular;
@@ -214,7 +216,7 @@ DirectLight direct_light(Scene scene, Receiver receiver, uint draws, uint rays) 
             drawn = environment_light(scene, receiver);
         }
         DirectLight reflected = receiver_reflect(receiver, drawn.ray.direction, drawn.ray.irradiance, drawn.specular_share);
-        add_light(sum, reflected, drawn.number, drawn.ray, visibility_seed(receiver, drawn.salt));
+        add_light(sum, reflected, scene, receiver.medium, drawn.number, drawn.ray, visibility_seed(receiver, drawn.salt));
     }
     return sum;
 }

@@ -31,7 +31,8 @@ float emissive_pdf(Scene scene, Material material, float distance_m, float cosin
     return share > 0.0 ? share * distance_m / abs(cosine) * distance_m : 0.0;
 }
 
-// Radiance that a point of a triangle sends along a direction; textures at the base level.
+// Radiance that a point of a triangle sends along a direction, as far as the triangle is there: the shadow ray ends in front of it and does not
+// meet its alpha. Textures at the base level.
 vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Material material, Triangle triangle, vec2 barycentric, SurfacePoint point,
     vec3 leaving) {
     bool front = dot(leaving, point.normal) > 0.0;
@@ -39,13 +40,15 @@ vec3 triangle_emission(Scene scene, EmissiveTriangle emitter, Material material,
         return vec3(0.0);
     }
     Attributes attributes = triangle_attributes(scene, emitter.instance, triangle, barycentric);
-    TexturePoint textures_at;
-    textures_at.uv = attributes.uv;
-    textures_at.uv_area = float[2](0.0, 0.0);
-    if (material_has_lobes(material)) {
-        return surface_shade(scene, material, point, front, attributes, textures_at, leaving).emissive;
+    TexturePoint textures_at = base_level_point(attributes);
+    float coverage = 1.0;
+    if (material_has_alpha(material)) {
+        coverage = material_coverage(material, material_base_color(material, textures_at, attributes.color).a);
     }
-    return material_emissive(material, textures_at);
+    if (material_has_lobes(material)) {
+        return coverage * surface_shade(scene, material, point, front, attributes, textures_at, leaving).emissive;
+    }
+    return coverage * material_emissive(material, textures_at);
 }
 
 // One emissive triangle drawn by area x luminance (choice), one point on it, uniform per area (xi). Only where emissive_count > 0.

@@ -116,12 +116,17 @@ LightSample light_sample(Light light, vec3 position, vec2 xi) {
     return s;
 }
 
-// True where a ray from `position` meets the light no later than t_max_m (FLOAT_MAX: it hit nothing), with the light's radiance and the
-// density of light_sample.
-bool light_intersect(Light light, vec3 position, vec3 direction, float t_max_m, out vec3 radiance, out float pdf) {
+// A light that a ray meets.
+struct LightMet {
+    float distance_m;   // FLOAT_MAX for lights at infinity
+    vec3 radiance;
+    float pdf;          // of light_sample, 1/sr
+};
+
+// True where a ray from `position` meets the light no later than t_max_m (FLOAT_MAX: it hit nothing).
+bool light_intersect(Light light, vec3 position, vec3 direction, float t_max_m, out LightMet met) {
     LightCone cone = light_cone(light, position);
-    radiance = vec3(0.0);
-    pdf = 0.0;
+    met = LightMet(FLOAT_MAX, vec3(0.0), 0.0);
     if (cone.one_minus_cos <= 0.0) {
         return false;
     }
@@ -130,12 +135,8 @@ bool light_intersect(Light light, vec3 position, vec3 direction, float t_max_m, 
     if (rise > cone.one_minus_cos) {
         return false;
     }
-    if (light_cone_distance(light, cone, 1.0 - rise, rise * (2.0 - rise)) > t_max_m) {
-        return false;
-    }
-    radiance = light_cone_radiance(cone);
-    pdf = light_cone_pdf(cone);
-    return true;
+    met = LightMet(light_cone_distance(light, cone, 1.0 - rise, rise * (2.0 - rise)), light_cone_radiance(cone), light_cone_pdf(cone));
+    return met.distance_m <= t_max_m;
 }
 
 // Draws an entry of an alias table with two random numbers.

@@ -113,6 +113,11 @@ CoatShares coat_shares(Brdf brdf, Sides sides, bool front, float v_dot_h) {
     return shares;
 }
 
+// Share that KHR_materials_transmission sends on through the coat.
+vec3 coat_transmittance(Surface surface, CoatShares shares) {
+    return surface.base_color * (shares.base * surface.transmission * (1.0 - surface.metallic));
+}
+
 // glTF material: the GGX coat, and through it KHR_materials_transmission, both about one visible normal. A thin sheet sends light on as if
 // mirrored and turned over; a volume bends it.
 Scatter scatter_pbr(Surface surface, Sides sides, bool may_reflect, bool may_transmit, float choice_xi, vec2 xi) {
@@ -127,7 +132,7 @@ Scatter scatter_pbr(Surface surface, Sides sides, bool may_reflect, bool may_tra
     CoatShares shares = coat_shares(brdf, sides, surface.front, v_dot_h);
     vec3 reflectance = shares.reflected;
     float cos_t = shares.cos_t;
-    vec3 transmittance = surface.base_color * (shares.base * surface.transmission * (1.0 - surface.metallic));
+    vec3 transmittance = coat_transmittance(surface, shares);
     float probability;
     bool reflects = choose_reflection(may_reflect, may_transmit, max_component(reflectance), max_component(transmittance), choice_xi,
         probability);
@@ -143,6 +148,11 @@ Scatter scatter_pbr(Surface surface, Sides sides, bool may_reflect, bool may_tra
         float weight = ggx_sample_weight(v.z, max(l.z, 0.0), brdf.alpha) / probability;
         return Scatter(valid, false, normalize_or(direction, surface.geometric_normal), reflectance * weight,
             ggx_pdf_reflected(v, h, brdf.alpha));
+    }
+    if (!sides.thin && sides.eta == 1.0) {
+        // Nothing bends, so no microfacet stands in the way: as at a smooth surface (lib/bsdf.glsl).
+        transmittance = coat_transmittance(surface, coat_shares(brdf, sides, surface.front, v.z));
+        return Scatter(max_component(transmittance) > 0.0, true, -surface.view, transmittance / probability, 0.0);
     }
     l = sides.thin ? vec3(l.xy, -l.z) : refract_travel(-v, h, sides.eta, v_dot_h, cos_t);
     float weight = ggx_sample_weight(v.z, max(-l.z, 0.0), brdf.alpha) / probability;

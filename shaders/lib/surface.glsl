@@ -156,6 +156,14 @@ TexturePoint cone_texture_point(Element element, Attributes attributes, float co
     return point;
 }
 
+// Where textures are read as they were painted.
+TexturePoint base_level_point(Attributes attributes) {
+    TexturePoint point;
+    point.uv = attributes.uv;
+    point.uv_area = float[2](0.0, 0.0);
+    return point;
+}
+
 // Surface of an element. travel: unit direction of the ray that met it; cone_width_m: of the ray cone there.
 Surface surface_from_element(Scene scene, uint instance_slot, uint geometry, Element element, vec3 travel, float cone_width_m) {
     SurfacePoint point = element_point(element);
@@ -171,16 +179,17 @@ Surface surface_from_hit(Scene scene, Hit hit, vec3 travel, float cone_width_m) 
     return surface_from_element(scene, hit.instance, hit.geometry, element_fetch(scene, hit), travel, cone_width_m);
 }
 
+bool material_has_alpha(Material material) {
+    return (material.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND)) != 0u;
+}
+
 // Coverage at a hit for any-hit shaders, 0..1. Read at the base level: a mask's edge stays as sharp as it was painted.
 float hit_coverage(Scene scene, Hit hit, Material material) {
-    if ((material.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND)) == 0u) {
+    if (!material_has_alpha(material)) {
         return 1.0;
     }
     Attributes attributes = element_attributes(scene, hit.instance, element_fetch(scene, hit));
-    TexturePoint textures_at;
-    textures_at.uv = attributes.uv;
-    textures_at.uv_area = float[2](0.0, 0.0);
-    return material_coverage(material, material_base_color(material, textures_at, attributes.color).a);
+    return material_coverage(material, material_base_color(material, base_level_point(attributes), attributes.color).a);
 }
 #endif
 

@@ -38,6 +38,8 @@ struct SurfacePayload {
 struct ShadowPayload {
     vec3 transmittance; // in: 1; multiplied by every refractive surface passed
     vec3 optical_depth; // in: 0; absorption x distance: +t where a medium is left, -t where it is entered
+    vec3 attenuation_per_m; // in: of the medium at the origin; then of those entered and not left
+    int media;          // in: 1 where the ray starts in a medium, else 0; then the number of those
     uint visible;       // in: 0; 1 when nothing opaque was in the way
     uint seed;          // in: for stochastic alpha in shadow.rahit
 };

@@ -12,7 +12,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 1, binding = 9) uniform texture2D reflected;
 layout(set = 1, binding = 10) uniform texture2D reflected_tint;   // of a path the whole tint, else that of the image alone
 
-vec3 light_visibility(vec3 origin, vec3 direction, float t_max_m, uint seed) {
+vec3 light_visibility(Scene scene, vec3 origin, vec3 direction, float t_max_m, uint medium, uint seed) {
     return vec3(1.0);
 }
 

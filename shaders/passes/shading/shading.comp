@@ -8,7 +8,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "passes/shading/shading_pixel.glsl"
 
-vec3 light_visibility(vec3 origin, vec3 direction, float t_max_m, uint seed) {
+vec3 light_visibility(Scene scene, vec3 origin, vec3 direction, float t_max_m, uint medium, uint seed) {
     return vec3(1.0);
 }
 

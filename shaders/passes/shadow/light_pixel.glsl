@@ -7,6 +7,7 @@
 
 #include "lib/gbuffer.glsl"
 #include "lib/direct_light.glsl"
+#include "lib/scatter.glsl"
 
 layout(set = 1, binding = 0) uniform utexture2D gbuffer_id;
 layout(set = 1, binding = 1) uniform utexture2D gbuffer_normal;
@@ -35,7 +36,9 @@ void light_pixel(uvec2 pixel) {
 #endif
         bool lobe_traced = frame.max_depth > 0u && surface_reflects(frame, surface);
         Sequence sequence = sequence_begin(frame.seed, pixel, frame.sample_index);
-        Receiver receiver = receiver_begin(surface, lobe_traced, sequence, 0u, 0u);
+        // The camera is taken to be in air, unless it sees the inside of a volume.
+        uint medium = surface_interface(scene, surface, id.w, media_outside()).before;
+        Receiver receiver = receiver_begin(surface, medium, lobe_traced, sequence, 0u, 0u);
         DirectLight light = direct_light(scene, receiver, frame.light_samples, frame.shadow_rays);
         diffuse = vec4(light.diffuse, 1.0);
         specular = vec4(demodulate(light.specular, brdf_specular_albedo(receiver.brdf, receiver.v.z)), 1.0);

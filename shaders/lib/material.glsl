@@ -9,6 +9,7 @@
 #include "shared/scene.glsl"
 #include "shared/textures.glsl"
 #include "shared/needs.glsl"
+#include "lib/ggx.glsl"
 #include "lib/vector.glsl"
 
 struct TexturePoint {
@@ -83,6 +84,13 @@ float material_coverage(Material material, float alpha) {
         return alpha < material.alpha_cutoff ? 0.0 : 1.0;
     }
     return (material.flags & MATERIAL_ALPHA_BLEND) != 0u ? clamp(alpha, 0.0, 1.0) : 1.0;
+}
+
+// Shows sharp images alone, everywhere: the mirror of its mode, or smooth metal without further lobes.
+bool material_is_mirror(Material material) {
+    bool metal = material.mode == MODE_PBR && material.metallic >= 1.0 && material.lobes == 0u;
+    bool polished = ggx_is_delta(material.roughness * material.roughness) && !uses_texture(material.metallic_roughness_texture);
+    return material.mode == MODE_REFLECTIVE || (metal && polished);
 }
 
 bool material_emits_behind(Material material) {

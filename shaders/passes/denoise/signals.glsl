@@ -6,6 +6,7 @@
 
 #include "shared/frame.glsl"
 #include "lib/light_signals.glsl"
+#include "lib/material.glsl"
 #include "lib/octahedral.glsl"
 #include "lib/vector.glsl"
 
@@ -91,7 +92,7 @@ Place place_at(Frame frame, ivec2 p) {
     place.depth = texelFetch(gbuffer_depth, p, 0).x;
     place.slope = vec2(slope_along(frame, p, ivec2(1, 0), place.depth), slope_along(frame, p, ivec2(0, 1), place.depth));
     place.image_depth = HAS_REFLECTED ? texelFetch(image_of_surface, p, 0).z : 0.0;
-    bool mirror = MaterialTable(SceneTable(frame.scene).scene.materials).at[place.id.y].mode == MODE_REFLECTIVE;
+    bool mirror = material_is_mirror(MaterialTable(SceneTable(frame.scene).scene.materials).at[place.id.y]);
     place.image_least = mirror ? IMAGE_LEAST_MIRROR : IMAGE_LEAST;
     return place;
 }

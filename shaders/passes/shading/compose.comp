@@ -1,5 +1,6 @@
-// Puts denoised light back onto the first surfaces. In: the G-buffer, the denoised signals and their tint. Out: `shaded`, linear HDR, where there
-// is a surface. Direct light is put onto the material as pass shading does; a path's light is whole and has one tint (path_trace.rgen).
+// Puts denoised light back onto the first surfaces. In: the G-buffer, the denoised signals and their tint; in `shaded` the lamps that mirrors show.
+// Out: `shaded`, linear HDR, where there is a surface. Direct light is put onto the material as pass shading does; a path's light is whole and
+// has one tint (path_trace.rgen).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define LIGHT_WITHOUT_RAYS
@@ -40,5 +41,6 @@ void main() {
         tint *= passed * surface_lobe_tint(surface);
         direct = first_light(surface, pixel);
     }
-    imageStore(shaded, at, vec4(passed * direct + tint * brought, 1.0));
+    vec3 mirrored = imageLoad(shaded, at).rgb;
+    imageStore(shaded, at, vec4(passed * direct + tint * brought + mirrored, 1.0));
 }

@@ -15,7 +15,7 @@ layout(set = 1, binding = 3) uniform texture2D gbuffer_material;
 layout(set = 1, binding = 4) uniform texture2D gbuffer_emissive;
 layout(set = 1, binding = 5) uniform texture2D direct_diffuse;
 layout(set = 1, binding = 6) uniform texture2D direct_specular;
-layout(set = 1, binding = 7, rgba32f) uniform writeonly image2D shaded;
+layout(set = 1, binding = 7, rgba32f) uniform image2D shaded;
 
 Surface first_surface(Frame frame, Scene scene, uvec2 pixel, uvec4 id) {
     ivec2 at = ivec2(pixel);

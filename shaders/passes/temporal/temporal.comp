@@ -12,6 +12,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/camera.glsl"
 #include "lib/element.glsl"
 #include "lib/light_signals.glsl"
+#include "lib/material.glsl"
 #include "lib/octahedral.glsl"
 #include "lib/reprojection.glsl"
 
@@ -320,7 +321,7 @@ void main() {
     Signals old = NO_SIGNALS;
     if ((frame.flags & FRAME_HISTORY) != 0u) {
         // What bends or spreads an image gives it no place that could be found again; a mirror's is exact while nothing moves.
-        bool mirror = MaterialTable(scene.materials).at[id.w].mode == MODE_REFLECTIVE;
+        bool mirror = material_is_mirror(MaterialTable(scene.materials).at[id.w]);
         reproject_surface(frame, pixel, seen, HAS_REFLECTED && (!mirror || (frame.flags & FRAME_STEADY) != 0u), old);
         if (HAS_REFLECTED) {
             reproject_image(frame, pixel, seen, brought.a, old);

@@ -2,7 +2,7 @@
 //! In: a [`Material`]. Out: its JSON, which import reads back as the same material. What the shading mode does not look at
 //! is written so that other programs show the same.
 
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 
 use super::json::{Extensions, Object, Put, number, numbers};
 use super::texture::Textures;
@@ -164,6 +164,8 @@ fn as_shown(source: &Material) -> Material {
         ShadingMode::Refractive if !is_smooth_glass(source) => {
             (material.metallic, material.roughness, material.transmission) = (0.0, 0.0, 1.0);
             (material.metallic_roughness_texture, material.transmission_texture) = (None, None);
+            (material.specular, material.specular_color) = (1.0, Vec3::ONE);
+            (material.specular_texture, material.specular_color_texture) = (None, None);
             (material.anisotropy, material.clearcoat, material.iridescence) = (None, None, None);
             (material.sheen, material.diffuse_transmission, material.specular_glossiness) =
                 (None, None, None);

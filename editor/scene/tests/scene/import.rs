@@ -371,7 +371,7 @@ fn materials_get_the_shading_mode_that_fits() {
     let materials = [
         r#"{"extensions":{"KHR_materials_unlit":{}}}"#.to_owned(),
         glass(0.0, ""),
-        glass(0.05, r#","KHR_materials_volume":{"thicknessFactor":0.1,"attenuationDistance":0.5}"#),
+        glass(0.0, r#","KHR_materials_volume":{"thicknessFactor":0.1,"attenuationDistance":0.5}"#),
         glass(0.3, ""),
         r#"{"pbrMetallicRoughness":{"roughnessFactor":0}}"#.to_owned(),
         r#"{"emissiveFactor":[1,0.5,0],"extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":8}}}"#.to_owned(),

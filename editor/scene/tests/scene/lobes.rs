@@ -151,19 +151,30 @@ fn values_out_of_their_range_are_held_to_it_with_a_warning_that_names_the_field(
 }
 
 #[test]
-fn smooth_glass_keeps_its_mode_unless_a_lobe_scatters() {
+fn smooth_glass_has_its_mode_only_where_it_is_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
-    let glass = |more: &str| {
+    let mode = |[metallic, roughness, transmission]: [f32; 3], more: &str| {
         let text = format!(
-            r#"{{"pbrMetallicRoughness":{{"metallicFactor":0,"roughnessFactor":0}},
-            "extensions":{{"KHR_materials_transmission":{{"transmissionFactor":1}}{more}}}}}"#
+            r#"{{"pbrMetallicRoughness":{{"metallicFactor":{metallic},"roughnessFactor":{roughness}}},
+            "extensions":{{"KHR_materials_transmission":{{"transmissionFactor":{transmission}}}{more}}}}}"#
         );
         load(&file(folder.path(), &text), &ImportOptions::default()).unwrap().materials[0].mode
     };
-    assert_eq!(glass(""), ShadingMode::Refractive);
-    assert_eq!(glass(r#","KHR_materials_dispersion":{"dispersion":1}"#), ShadingMode::Refractive);
-    assert_eq!(glass(r#","KHR_materials_clearcoat":{"clearcoatFactor":1}"#), ShadingMode::Pbr);
-    assert_eq!(glass(r#","KHR_materials_iridescence":{"iridescenceFactor":1}"#), ShadingMode::Pbr);
+    let glass = [0.0, 0.0, 1.0];
+    assert_eq!(mode(glass, ""), ShadingMode::Refractive);
+    assert_eq!(mode(glass, r#","KHR_materials_dispersion":{"dispersion":1}"#), ShadingMode::Refractive);
+    for lobe in [
+        r#","KHR_materials_clearcoat":{"clearcoatFactor":1}"#,
+        r#","KHR_materials_iridescence":{"iridescenceFactor":1}"#,
+        r#","KHR_materials_specular":{"specularFactor":0.9}"#,
+        r#","KHR_materials_specular":{"specularColorFactor":[1,1,0.9]}"#,
+    ] {
+        assert_eq!(mode(glass, lobe), ShadingMode::Pbr, "{lobe}");
+    }
+    // A metal lets no light pass, part of a surface may be no glass, and rough glass is not smooth.
+    for values in [[1.0, 0.0, 1.0], [0.01, 0.0, 1.0], [0.0, 0.0, 0.99], [0.0, 0.0, 0.51], [0.0, 0.01, 1.0]] {
+        assert_eq!(mode(values, ""), ShadingMode::Pbr, "{values:?}");
+    }
 }
 
 #[test]

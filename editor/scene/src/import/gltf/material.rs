@@ -12,10 +12,6 @@ use crate::assets::{AlphaMode, MAX_RADIANCE, Material, ShadingMode, TextureUse};
 
 mod lobes;
 
-/// Share of transmitted light above which a material may count as glass.
-const GLASS_TRANSMISSION: f32 = 0.5;
-/// Roughness up to which glass counts as smooth.
-const SMOOTH_ROUGHNESS: f32 = 0.05;
 /// Stands for an infinite index of refraction: all light is reflected.
 pub(crate) const INFINITE_IOR: f32 = 1e6;
 
@@ -196,11 +192,20 @@ fn mode_of_name(name: &str) -> Option<ShadingMode> {
         .find(|mode| mode.name() == name)
 }
 
-/// Whether a material with these values is smooth glass, which has a mode of its own with the exact Fresnel equations.
+/// Whether a material with these values is smooth glass, which has a mode of its own with the exact Fresnel equations:
+/// a whole dielectric that lets all light pass, unspread. Whatever is partly something else stays what it is.
 pub(crate) fn is_smooth_glass(material: &Material) -> bool {
-    let smooth = material.roughness <= SMOOTH_ROUGHNESS && material.metallic_roughness_texture.is_none();
-    let evenly_clear = material.transmission > GLASS_TRANSMISSION && material.transmission_texture.is_none();
-    evenly_clear && smooth && !material.has_scattering_lobe()
+    let values = (material.metallic, material.roughness, material.transmission, material.specular);
+    let textures = [
+        &material.metallic_roughness_texture,
+        &material.transmission_texture,
+        &material.specular_texture,
+        &material.specular_color_texture,
+    ];
+    values == (0.0, 0.0, 1.0, 1.0)
+        && material.specular_color == Vec3::ONE
+        && textures.iter().all(|texture| texture.is_none())
+        && !material.has_scattering_lobe()
 }
 
 /// Smooth glass is told by its values, the rest by name.

@@ -253,6 +253,31 @@ fn every_pipeline_and_target_can_be_asked_for() {
 }
 
 #[test]
+fn what_has_no_effect_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("far.obj"), "v 0 0 -1\nv 1 0 -1\nv 0 1 -1\nf 1 2 3\n")
+        .expect("a model");
+    let warning = |arguments: &[&str]| {
+        let run = render(folder.path(), "far.obj", &[&["-o", "a.png", "--samples", "1"], arguments].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        run.stderr.lines().find_map(|line| Some(line.split_once("without effect: ")?.1.to_owned()))
+    };
+    for (arguments, named) in [
+        (["--pipeline", "path", "--show", "direct_diffuse"], Some("--show")),
+        (["--pipeline", "path", "--show", "direct_specular"], Some("--show")),
+        (["--pipeline", "hybrid", "--show", "direct_diffuse"], None),
+        (["--pipeline", "raster", "--show", "ray_depth"], Some("--show")),
+        (["--pipeline", "raster", "--max-depth", "3"], Some("--max-depth")),
+        (["--pipeline", "raster", "--max-depth", "0"], None),
+        (["--pipeline", "path", "--max-depth", "3"], None),
+    ] {
+        let found = warning(&arguments);
+        let named_alone = found.as_deref().zip(named).is_some_and(|(found, named)| found.starts_with(named));
+        assert!(named_alone || found.is_none() && named.is_none(), "{arguments:?}: {found:?}");
+    }
+}
+
+#[test]
 fn the_shadow_of_a_light_is_chosen_by_name_or_number() {
     let folder = tempfile::tempdir().expect("a folder");
     let shot = |output: &str, light: &[&str]| {

@@ -114,10 +114,10 @@ impl Show {
                 "Weights of the three corners of a triangle as red, green, blue; on spheres and boxes the texture coordinates as red, green"
             }
             Self::DirectDiffuse => {
-                "Light of lamps and environment before the surface colours it, exposed like the picture"
+                "Light of lamps and environment before the surface colours it, exposed like the picture; black in `path`, which does not keep it apart"
             }
             Self::DirectSpecular => {
-                "Highlights of lamps and environment before the surface colours them, exposed like the picture"
+                "Highlights of lamps and environment before the surface colours them, exposed like the picture; black in `path`, which does not keep them apart"
             }
             Self::Shadow => {
                 "White: the chosen light arrives; black: something is in its way; coloured: through glass; blue: turned away or out of its reach"

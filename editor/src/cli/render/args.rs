@@ -174,6 +174,9 @@ pub(super) fn without_effect(args: &RenderArgs, settings: &ViewSettings) -> Vec<
     let half = matches!(args.reflection_rate, Some(RateArg::Half));
     let penumbra = matches!(args.shadow_rate, Some(ShadowRateArg::Penumbra));
     let primary = matches!(args.primary, Some(PrimaryArg::Raster | PrimaryArg::Rays));
+    let deep = args.max_depth.is_some_and(|depth| depth > 1);
+    let apart = matches!(settings.show, Show::DirectDiffuse | Show::DirectSpecular);
+    let of_rays = matches!(settings.show, Show::Shadow | Show::RayDepth);
     let list = [
         (args.denoises() && raster, "--denoise: `raster` casts no rays, there is nothing to denoise"),
         (half && !args.denoises(), "--reflection-rate half: only while light is denoised (--denoise)"),
@@ -183,6 +186,9 @@ pub(super) fn without_effect(args: &RenderArgs, settings: &ViewSettings) -> Vec<
         (primary && settings.pipeline != Pipeline::Hybrid, "--primary: of `hybrid` alone"),
         (args.multiple_scattering && !path, "--multiple-scattering: of `path` alone"),
         (args.shadow_rays.is_some() && (raster || path), "--shadow-rays: of `hybrid` and `raytraced` alone"),
+        (deep && raster, "--max-depth above 1: `raster` casts no rays"),
+        (apart && path, "--show: `path` does not keep direct light apart, the view is black"),
+        (of_rays && raster, "--show: `raster` casts no rays, the view is black"),
     ];
     list.into_iter().filter(|(given, _)| *given).map(|(_, what)| what).collect()
 }

@@ -6,6 +6,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use caustica_renderer::delta::{AlphaMode, Camera, Material, Texture, Visibility};
 use caustica_renderer::{Pipeline, ViewSettings};
+use caustica_tests::picture::mean_of;
 use caustica_tests::scene::{Scene, camera_at, checker, lambert, plain_use, point_light, quad};
 use caustica_tests::shapes::at;
 use caustica_tests::studio::Studio;
@@ -122,6 +123,35 @@ fn what_is_there_in_part_lets_its_share_of_the_light_pass() {
         assert!((mean - expected).abs() < 4.0 * deviation, "{}: {mean} +- {deviation}", pipeline.name());
         let variance = shares.iter().map(|share| (share - mean).powi(2)).sum::<f64>() / count;
         assert!(variance > 0.0 && variance < 2.0 / SAMPLES as f64, "{}: {variance}", pipeline.name());
+    }
+}
+
+/// An emitter over the floor, which the camera does not see, lights it as far as it is there.
+#[test]
+fn what_is_there_in_part_shines_in_part() {
+    const COVERAGE: f32 = 0.3;
+    const PIPELINES: [Pipeline; 2] = [Pipeline::Hybrid, Pipeline::Path];
+    let lit_by = |alpha: AlphaMode| {
+        let (mut scene, camera) = under_a_screen(|_| Material {
+            base_color: Vec4::new(0.0, 0.0, 0.0, COVERAGE),
+            emissive: Vec3::splat(5.0),
+            alpha,
+            double_sided: true,
+            ..lambert(0.0)
+        });
+        scene.delta.lights.clear();
+        let mut studio = Studio::of(EXTENT, still(Pipeline::Hybrid), &scene.delta, camera);
+        PIPELINES.map(|pipeline| {
+            studio.set(|settings| settings.pipeline = pipeline);
+            mean_of(&studio.mean(16))
+        })
+    };
+    let [whole, part, hole] =
+        [AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Mask { cutoff: 0.5 }].map(lit_by);
+    for (i, pipeline) in PIPELINES.into_iter().enumerate() {
+        assert!(whole[i] > 0.1 && hole[i] == 0.0, "{}: {} {}", pipeline.name(), whole[i], hole[i]);
+        let share = part[i] / whole[i];
+        assert!((share - COVERAGE).abs() < 0.02 * COVERAGE, "{}: {share}", pipeline.name());
     }
 }
 

@@ -5,7 +5,7 @@
 use caustica_renderer::delta::{Camera, InstanceId, Light, Material, SceneDelta};
 use caustica_renderer::{Pipeline, ReflectionRate, ShadowRate, ViewSettings};
 use caustica_tests::picture::rel_mse;
-use caustica_tests::scene::{Scene, camera_at, lambert, mirror, quad, zoo};
+use caustica_tests::scene::{Scene, camera_at, checker, lambert, mirror, plain_use, quad, zoo};
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec3};
 
@@ -171,6 +171,54 @@ fn what_was_hidden_has_no_past() {
         let centre = (EXTENT[1] / 2 * EXTENT[0] + EXTENT[0] / 2) as usize;
         let (seen, wanted) = (f64::from(after[centre][1]), f64::from(expected[centre][1]));
         assert!((seen / wanted - 1.0).abs() < 0.1, "{}: {seen} instead of {wanted}", pipeline.name());
+    }
+}
+
+/// A mirror that fills the image, and in it a checkered wall and a bright lamp.
+fn wall_in_mirror(silver: Material) -> Scene {
+    let mut scene = Scene::new();
+    scene.put(quad(6.0, 4.0), silver, Affine3A::IDENTITY);
+    let texture = scene.texture(checker(3, 90, 230));
+    let wall = Material { base_color_texture: Some(plain_use(texture)), ..lambert(1.0) };
+    let behind = Affine3A::from_translation(Vec3::Z * 6.0);
+    scene.put(quad(14.0, 10.0), wall, behind * Affine3A::from_rotation_y(std::f32::consts::PI));
+    scene.light(Light::Point {
+        position: Vec3::new(0.5, 0.3, 4.0),
+        intensity: Vec3::splat(40.0),
+        radius_m: 0.2,
+        range_m: f32::INFINITY,
+    });
+    scene
+}
+
+/// Share of the pixels that are more than a fifth off.
+fn share_off(image: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
+    let off = |(x, r): &(&[f32; 3], &[f32; 3])| (x[1] - r[1]).abs() > 0.2 * r[1];
+    image.iter().zip(reference).filter(off).count() as f64 / image.len() as f64
+}
+
+/// Whether it is a mirror by its mode or by glTF's values; with jitter.
+#[test]
+fn what_a_mirror_shows_stays_sharp() {
+    let metal = Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
+    let scenes =
+        [("mirror", mirror()), ("metal", metal)].map(|(name, silver)| (name, wall_in_mirror(silver)));
+    let camera = camera_at(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 0.7);
+    for pipeline in [Pipeline::Hybrid, Pipeline::Path] {
+        // Cut, so that no path looks for the lamp by way of the wall and the mirror.
+        let jittered = ViewSettings { jitter: true, path_depth: Some(1), ..settings(pipeline) };
+        let mut studio = Studio::new(EXTENT, jittered);
+        for (name, scene) in &scenes {
+            studio.restage(&scene.delta, camera);
+            studio.set(|settings| settings.denoise_stills = false);
+            let reference = studio.mean(64).mean;
+            let lamp = reference.iter().filter(|pixel| pixel[1] > 10.0).count();
+            assert!(lamp > 20, "{lamp} pixels show the lamp");
+            studio.set(|settings| settings.denoise_stills = true);
+            let off = share_off(&studio.mean(12).mean, &reference);
+            println!("{name}, {}: {off:.4} of the pixels are off", pipeline.name());
+            assert!(off < 0.005, "{name}, {}: {off}", pipeline.name());
+        }
     }
 }
 

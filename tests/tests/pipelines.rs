@@ -4,10 +4,10 @@
 
 use std::collections::BTreeSet;
 
-use caustica_renderer::delta::{Geometry, Instance, InstanceId, SceneDelta, Visibility};
+use caustica_renderer::delta::{Geometry, Instance, InstanceId, Material, SceneDelta, Visibility};
 use caustica_renderer::{Accumulated, NeedsMode, Pipeline, ViewSettings};
 use caustica_tests::numbers::Random;
-use caustica_tests::picture::{bits, differing};
+use caustica_tests::picture::{bits, differing, mean_of};
 use caustica_tests::scene::{
     Scene, camera_at, camera_parallel, cube, glass, lambert, point_light, quad, sphere, zoo,
 };
@@ -312,6 +312,33 @@ fn back_sides_are_unseen_even_beside_glass() {
         assert!((at(0.0) - 0.5).abs() < 1e-3, "{}: glass {}", pipeline.name(), at(0.0));
         assert_eq!(at(-1.2), 0.5, "{}: the back", pipeline.name());
         assert!((at(1.2) - 0.4).abs() < 0.02, "{}: the front {}", pipeline.name(), at(1.2));
+    }
+}
+
+/// At an index of 1 no microfacet bends light, so roughness does not show: what is seen of a slab at an angle is the way
+/// through it.
+#[test]
+fn rough_glass_of_index_1_is_clear_to_all_rays() {
+    let fog = Material {
+        metallic: 0.0,
+        roughness: 1.0,
+        specular: 0.0,
+        transmission: 1.0,
+        ior: 1.0,
+        has_volume: true,
+        attenuation_color: Vec3::splat(0.5),
+        attenuation_distance_m: 1.0,
+        ..Material::default()
+    };
+    let mut scene = Scene::new();
+    scene.put(cube(1.0), fog, Affine3A::from_scale(Vec3::new(40.0, 40.0, 1.0)));
+    scene.surround(1.0);
+    let slanting = camera_at(Vec3::new(0.0, -6.0, 4.0), Vec3::ZERO, 0.01);
+    let expected = 0.5_f32.powf(13.0_f32.sqrt() / 2.0);
+    for pipeline in [Pipeline::Hybrid, Pipeline::Raytraced, Pipeline::Path] {
+        let image = Studio::of([8, 8], settings(pipeline), &scene.delta, slanting).mean(8);
+        let found = mean_of(&image);
+        assert!((found / expected - 1.0).abs() < 0.01, "{}: {found}, not {expected}", pipeline.name());
     }
 }
 

@@ -5,7 +5,7 @@ use caustica_tests::scene::{Scene, camera_at, cube, glass, lambert, mirror, quad
 use caustica_tests::studio::Studio;
 use glam::{Affine3A, Vec3};
 
-use super::{mean_and_error, settings};
+use super::{mean_and_error, settings, within};
 
 const EXTENT: [u32; 2] = [40, 40];
 
@@ -51,24 +51,33 @@ fn white_surfaces_vanish_in_a_white_room() {
         ("sheet", sheet(1.5)),
     ] {
         let (mean, error) = furnace.with(name, material, 32);
-        assert!((mean - 1.0).abs() < 4.0 * error + 1e-4, "{name}: {mean} +- {error}");
+        assert!((mean - 1.0).abs() < within(error, 1e-4, 2e-3), "{name}: {mean} +- {error}");
     }
 }
 
 #[test]
 fn rough_coats_and_rough_glass_make_no_light() {
     let mut furnace = Furnace::new();
-    for roughness in [0.0, 0.01, 0.3, 1.0] {
+    // Least means, background included, of metal, frosted glass and a frosted sheet: single scattering loses light at high
+    // roughness (glTF 2.0 appendix B); furnace-ggx has how much. Few, bright samples leave frosted glass by its rim.
+    for (roughness, least, error_max) in [
+        (0.0, [0.999; 3], 1e-3),
+        (0.01, [0.9985; 3], 1e-3),
+        (0.3, [0.98, 0.94, 0.965], 0.015),
+        (1.0, [0.625, 0.575, 0.48], 2e-3),
+    ] {
         let metal = Material { metallic: 1.0, roughness, ..Material::default() };
         let frosted =
             Material { metallic: 0.0, roughness, transmission: 1.0, has_volume: true, ..Material::default() };
         let pane = Material { has_volume: false, double_sided: true, ..frosted.clone() };
-        for (name, material) in [("metal", metal), ("frosted glass", frosted), ("frosted sheet", pane)] {
-            let (mean, error) = furnace.with(&format!("{name}, roughness {roughness}"), material, 16);
-            // Single scattering loses light at high roughness (glTF 2.0 appendix B); furnace-ggx has how much.
-            assert!(mean < 1.0 + 4.0 * error + 1e-4, "{name}, roughness {roughness}: {mean} +- {error}");
-            let least = if roughness > 0.1 { 0.4 } else { 0.96 };
-            assert!(mean > least, "{name}, roughness {roughness}: {mean}");
+        let materials = [("metal", metal), ("frosted glass", frosted), ("frosted sheet", pane)];
+        for ((name, material), least) in materials.into_iter().zip(least) {
+            let (mean, error) = furnace.with(&format!("{name}, roughness {roughness}"), material, 64);
+            assert!(
+                mean < 1.0 + within(error, 1e-4, error_max),
+                "{name}, roughness {roughness}: {mean} +- {error}"
+            );
+            assert!(mean > least, "{name}, roughness {roughness}: {mean}, not {least}");
         }
     }
 }
@@ -82,8 +91,8 @@ fn what_is_half_glass_makes_no_light() {
             Material { metallic: 0.0, roughness, transmission: 0.5, has_volume: true, ..Material::default() };
         let (mean, error) = furnace.with(&format!("half glass, roughness {roughness}"), half, 32);
         // glTF lets the base have a little more than the coat leaves.
-        assert!(mean < 1.01 + 4.0 * error, "roughness {roughness}: {mean} +- {error}");
-        assert!(error < 0.01 && mean > 0.95, "roughness {roughness}: {mean} +- {error}");
+        assert!(mean < 1.01 + within(error, 0.0, 4e-3), "roughness {roughness}: {mean} +- {error}");
+        assert!(mean > 0.95, "roughness {roughness}: {mean} +- {error}");
     }
 }
 
@@ -94,7 +103,7 @@ fn rough_metal_loses_nothing_when_repeated_scattering_counts() {
     for roughness in [0.0, 0.15, 0.4, 0.7, 1.0] {
         let metal = Material { metallic: 1.0, roughness, ..Material::default() };
         let (mean, error) = furnace.with(&format!("roughness {roughness}"), metal, 32);
-        assert!((mean - 1.0).abs() < 4.0 * error + 2e-3, "roughness {roughness}: {mean} +- {error}");
+        assert!((mean - 1.0).abs() < within(error, 2e-3, 2e-3), "roughness {roughness}: {mean} +- {error}");
     }
 }
 
@@ -109,13 +118,14 @@ fn paths_between_walls_are_as_long_as_they_need_to_be() {
     let mut studio = Studio::of(EXTENT, settings(), &scene.delta, camera);
     let (mean, error) = mean_and_error(&studio.mean(64), 0);
     let expected = 0.5 / (1.0 - f64::from(albedo));
-    assert!((mean - expected).abs() < 4.0 * error + 1e-4, "{mean} +- {error}, not {expected}");
+    assert!((mean - expected).abs() < within(error, 1e-4, 5e-3), "{mean} +- {error}, not {expected}");
     // Cut at a depth the sum is the first terms of the series, exactly.
     for depth in [0, 1, 3] {
         studio.set(|settings| settings.path_depth = Some(depth));
         let (mean, error) = mean_and_error(&studio.mean(32), 0);
         let terms = (0..=depth + 1).map(|k| 0.5 * f64::from(albedo).powi(k as i32)).sum::<f64>();
-        assert!((mean - terms).abs() < 4.0 * error + 1e-4, "depth {depth}: {mean} +- {error}, not {terms}");
+        let bound = within(error, 1e-4, 5e-3);
+        assert!((mean - terms).abs() < bound, "depth {depth}: {mean} +- {error}, not {terms}");
     }
 }
 
@@ -137,4 +147,31 @@ fn sheets_of_glass_let_the_sun_in() {
     let (open, behind) = (radiance_of(false), radiance_of(true));
     // Two interfaces, head-on: r = 0.04, 1 - 2 r / (1 + r).
     assert!((behind / open - (1.0 - 0.08 / 1.04)).abs() < 2e-3, "{behind} of {open}");
+}
+
+/// What lies behind a sheet is found by drawn directions and by the path itself, each weighted for the other: both have to
+/// reach it where the path is cut.
+#[test]
+fn cut_paths_find_a_panel_behind_a_sheet() {
+    let radiance_of = |tint: Option<f32>| {
+        let mut scene = Scene::new();
+        scene.put(quad(6.0, 6.0), lambert(0.5), Affine3A::IDENTITY);
+        if let Some(tint) = tint {
+            let tinted = Material { base_color: Vec3::splat(tint).extend(1.0), ..sheet(1.0) };
+            scene.put(quad(6.0, 6.0), tinted, Affine3A::from_translation(Vec3::Z));
+        }
+        let panel = Material { emissive: Vec3::splat(2.0), double_sided: true, ..lambert(0.0) };
+        scene.put(quad(3.0, 3.0), panel, Affine3A::from_translation(Vec3::Z * 1.5));
+        let camera = camera_at(Vec3::new(0.0, -0.4, 0.7), Vec3::ZERO, 0.1);
+        let mut studio = Studio::of([16, 16], settings(), &scene.delta, camera);
+        studio.set(|settings| settings.path_depth = Some(0));
+        mean_and_error(&studio.mean(64), 0)
+    };
+    let (open, error) = radiance_of(None);
+    for tint in [1.0, 0.5] {
+        let (behind, error_behind) = radiance_of(Some(tint));
+        let off = (behind - f64::from(tint) * open).abs();
+        let bound = within(error + error_behind, 1e-3, 3e-3);
+        assert!(off < bound, "tint {tint}: {behind} +- {error_behind} of {open} +- {error}");
+    }
 }

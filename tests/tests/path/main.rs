@@ -12,6 +12,13 @@ fn settings() -> ViewSettings {
     ViewSettings { pipeline: Pipeline::Path, temporal: false, ..ViewSettings::default() }
 }
 
+/// How far a mean of this standard error may be from what it should be: 4 of them and `rounding`. An error above
+/// `error_max` would make that no test.
+fn within(error: f64, rounding: f64, error_max: f64) -> f64 {
+    assert!(error < error_max, "the error is {error}, not below {error_max}");
+    4.0 * error + rounding
+}
+
 /// Mean of a channel, and the standard error of that mean as the two streams tell it.
 fn mean_and_error(image: &Accumulated, channel: usize) -> (f64, f64) {
     let count = image.mean.len() as f64;

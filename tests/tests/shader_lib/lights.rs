@@ -40,10 +40,10 @@ fn sphere_lights_are_exact_from_far_and_near() {
             bad += is_finite(s.direction) && is_finite(s.irradiance) && is_finite(s.distance_m) ? 0.0 : 1.0;
             sum += s.direction * s.irradiance.x;
             off_surface = max(off_surface, abs(length(position + s.direction * s.distance_m) - light.radius_m) / scale);
-            vec3 radiance;
-            float met_pdf;
-            if (light_intersect(light, position, s.direction, FLOAT_MAX, radiance, met_pdf)) {
-                unequal = max(unequal, abs(radiance.x / met_pdf / s.irradiance.x - 1.0));
+            LightMet met;
+            if (light_intersect(light, position, s.direction, FLOAT_MAX, met)) {
+                unequal = max(unequal, abs(met.radiance.x / met.pdf / s.irradiance.x - 1.0));
+                unequal = max(unequal, abs(met.distance_m / s.distance_m - 1.0));
             } else {
                 missed += 1.0;
             }

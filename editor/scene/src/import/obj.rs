@@ -1,29 +1,49 @@
-//! OBJ with its MTL, through tobj: triangulated, one mesh an object or group, one primitive a material.
-//! In: a path. Out: [`Imported`]. Material libraries and images are read only from the model's folder.
+//! OBJ through tobj, with its MTL: triangulated, one mesh an object, one primitive a material of a group; without objects
+//! one mesh a group. In: a path. Out: [`Imported`]. Material libraries and images are read only from the model's folder.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
-use std::path::Path;
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use tobj::{LoadError, LoadOptions, Model};
+use tobj::{LoadOptions, Model};
 
 use super::geometry::{Attributes, MeshBuilder, PrimitiveInput};
 use super::gltf::buffers::read_file;
 use super::{ImportError, ImportOptions, Imported, Warning, file_stem, read_model_file, uri};
-use crate::assets::Mesh;
+use crate::assets::{Material, Mesh};
 use crate::ids::{MaterialId, MeshId};
 use crate::prefab::{PartNode, Prefab};
+use lines::Tidy;
+use mtl::Source;
 
+mod bake;
 mod lines;
+mod maps;
+mod material;
 mod mtl;
+mod polygons;
 
 /// Largest material library that is read, bytes.
 const MAX_MTL_BYTES: u64 = 64 << 20;
 
+/// Polygons stay whole: tobj makes fans of them all.
 const OPTIONS: LoadOptions =
-    LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
+    LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
+
+/// What is said about the model and its libraries.
+#[derive(Default)]
+struct Warnings {
+    list: RefCell<Vec<Warning>>,
+}
+
+impl Warnings {
+    fn add(&self, file: &Path, place: impl Into<String>, message: impl Into<String>) {
+        let warning = Warning { file: file.to_owned(), place: place.into(), message: message.into() };
+        self.list.borrow_mut().push(warning);
+    }
+}
 
 /// Reads an OBJ file.
 pub(super) fn load(
@@ -32,48 +52,45 @@ pub(super) fn load(
     progress: &dyn Fn(&str, f32),
 ) -> Result<Imported, ImportError> {
     let bytes = read_model_file(path)?;
-    let text = String::from_utf8_lossy(&bytes);
-    let facts = lines::check(&text)
-        .map_err(|(line, reason)| ImportError::new(path, reason).at(format!("line {line}")))?;
+    let Tidy { text, smooth, materials: used, short_faces, other_elements } =
+        lines::tidy(&String::from_utf8_lossy(&bytes))
+            .map_err(|(line, reason)| ImportError::new(path, reason).at(format!("line {line}")))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     progress("reading faces", 0.1);
-    let warnings = RefCell::new(Vec::new());
-    let warn = |place: String, message: String| {
-        warnings.borrow_mut().push(Warning { file: path.to_owned(), place, message });
-    };
-    let material_loader = |library: &Path| {
-        let name = library.to_string_lossy();
-        let read = uri::beside(&name, folder).and_then(|file| read_file(&file, MAX_MTL_BYTES));
-        match read {
-            Ok(bytes) => tobj::load_mtl_buf(&mut String::from_utf8_lossy(&bytes).as_bytes()),
-            Err(reason) => {
-                let text = format!("{reason}; its materials are left out");
-                warn(format!("mtllib {name}"), text);
-                Err(LoadError::OpenFileFailed)
-            }
+    let warnings = Warnings::default();
+    for (count, what) in [
+        (short_faces, "faces of fewer than three corners"),
+        (other_elements, "points, lines, curves or surfaces"),
+    ] {
+        if count > 0 {
+            warnings.add(path, "", format!("{count} {what} were left out"));
         }
-    };
-    let (models, materials) = tobj::load_obj_buf(&mut text.as_bytes(), &OPTIONS, material_loader)
+    }
+    let libraries = Libraries { path, folder, warnings: &warnings, read: RefCell::default() };
+    let (mut models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &OPTIONS, |name| Ok(libraries.open(name)))
         .map_err(|error| ImportError::new(path, error.to_string()))?;
-    let mtl = materials.unwrap_or_else(|error| {
-        if error != LoadError::OpenFileFailed {
-            warn("mtllib".to_owned(), format!("{error}; its materials are left out"));
-        }
-        Vec::new()
-    });
+    drop(text);
+    let fans: usize = models.iter_mut().map(|model| polygons::triangulate(&mut model.mesh)).sum();
+    if fans > 0 {
+        let message = format!("{fans} faces cross themselves and became fans, which may not cover them");
+        warnings.add(path, "", message);
+    }
     progress("building meshes", 0.4);
+    let sources = libraries.read.into_inner().materials;
+    warn_of_unknown(&used, &sources, path, &warnings);
     let mut imported = Imported::default();
-    let (materials, textures) = mtl::read_all(&mtl, folder, options, &warn);
-    imported.materials = materials;
-    imported.textures = textures;
+    let mut maps = maps::Maps::new(folder, options, &warnings);
+    imported.materials = sources.iter().map(|source| material::read(source, &mut maps, &warnings)).collect();
+    imported.textures = maps.textures;
     let default_material = imported.materials.len();
     let without_material = |model: &Model| model.mesh.material_id.is_none_or(|id| id >= default_material);
     if models.iter().any(without_material) {
-        imported.materials.push(mtl::default_material());
+        imported.materials.push(material::default_material());
     }
     let mut parts = Vec::new();
-    for group in models.chunk_by(|a, b| a.name == b.name) {
-        let mesh = read_group(group, default_material, facts.smooth, &warn)
+    for object in models.chunk_by(|a, b| a.name == b.name) {
+        let warn = |place: String, message: String| warnings.add(path, place, message);
+        let mesh = read_object(object, &imported.materials, default_material, smooth, &warn)
             .map_err(|reason| ImportError::new(path, reason))?;
         if mesh.primitives.is_empty() {
             continue;
@@ -92,14 +109,73 @@ pub(super) fn load(
     }
     imported.prefab = Prefab::new(file_stem(path), path);
     imported.prefab.set_nodes(parts).map_err(|error| ImportError::new(path, error.to_string()))?;
-    imported.warnings = warnings.into_inner();
+    imported.warnings = warnings.list.into_inner();
     progress("done", 1.0);
     Ok(imported)
 }
 
-/// One mesh from the runs of one object or group; each run has its material.
-fn read_group(
+/// The material libraries that a model names, each read once.
+struct Libraries<'a> {
+    path: &'a Path,
+    folder: &'a Path,
+    warnings: &'a Warnings,
+    read: RefCell<Read>,
+}
+
+#[derive(Default)]
+struct Read {
+    files: BTreeSet<PathBuf>,
+    materials: Vec<Source>,
+}
+
+impl Libraries<'_> {
+    /// What tobj wants to know: names with their places. The rest is kept here.
+    fn open(&self, names: &Path) -> (Vec<tobj::Material>, HashMap<String, usize>) {
+        let names = names.to_string_lossy();
+        let beside = |name: &str| uri::beside(name, self.folder);
+        let whole = beside(&names).is_ok_and(|file| file.is_file());
+        // One name with blanks, or several names.
+        let list = if whole { vec![&*names] } else { names.split_whitespace().collect() };
+        let mut read = self.read.borrow_mut();
+        let start = read.materials.len();
+        for name in list {
+            let text = beside(name).and_then(|file| {
+                let bytes = if read.files.insert(file.clone()) {
+                    read_file(&file, MAX_MTL_BYTES)?
+                } else {
+                    Vec::new()
+                };
+                Ok((bytes, file))
+            });
+            match text {
+                Ok((bytes, file)) => {
+                    read.materials.extend(mtl::parse(&String::from_utf8_lossy(&bytes), &file, self.warnings));
+                }
+                Err(reason) => {
+                    let message = format!("{reason}; its materials are left out");
+                    self.warnings.add(self.path, format!("mtllib {name}"), message);
+                }
+            }
+        }
+        let named =
+            |source: &Source| tobj::Material { name: source.name.clone(), ..tobj::Material::default() };
+        let new: Vec<tobj::Material> = read.materials.iter().skip(start).map(named).collect();
+        let places = new.iter().enumerate().map(|(place, material)| (material.name.clone(), place)).collect();
+        (new, places)
+    }
+}
+
+fn warn_of_unknown(used: &BTreeSet<String>, sources: &[Source], path: &Path, warnings: &Warnings) {
+    let known: BTreeSet<&str> = sources.iter().map(|source| source.name.as_str()).collect();
+    for name in used.iter().filter(|name| !known.contains(name.as_str())) {
+        warnings.add(path, format!("usemtl {name}"), "there is no such material; a grey one stands in");
+    }
+}
+
+/// One mesh from the runs of one object; each run of a group has its material.
+fn read_object(
     models: &[Model],
+    materials: &[Material],
     default_material: usize,
     smooth: bool,
     warn: &dyn Fn(String, String),
@@ -117,7 +193,10 @@ fn read_group(
             attributes: &Arc::new(attributes),
             indices: mesh.indices.clone(),
             material: MaterialId(material as u64),
-            normal_map_tex_coord: None,
+            normal_map_tex_coord: materials
+                .get(material)
+                .and_then(|material| material.normal_texture)
+                .map(|texture| texture.tex_coord),
         };
         builder.add(input).map_err(|_| format!("object {name} has more vertices than 32 bits can count"))?;
     }
@@ -136,7 +215,9 @@ fn read_attributes(mesh: &tobj::Mesh, smooth: bool) -> Attributes {
     let positions: Vec<Vec3> = triples(&mesh.positions).map(Vec3::from).collect();
     let count = positions.len();
     let full = |length: usize, width: usize| length > 0 && length / width == count;
-    let normals = if full(mesh.normals.len(), 3) {
+    // All zero: stand-ins, because another run has normals.
+    let any_normal = mesh.normals.iter().any(|&number| number != 0.0);
+    let normals = if any_normal && full(mesh.normals.len(), 3) {
         Some(triples(&mesh.normals).map(Vec3::from).collect())
     } else {
         smooth.then(|| smooth_normals(&positions, &mesh.indices))

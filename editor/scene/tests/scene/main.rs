@@ -25,6 +25,7 @@ mod import;
 mod journal;
 mod lobes;
 mod locks;
+mod obj;
 mod oracle;
 mod projects;
 mod projects_moved;

@@ -11,7 +11,7 @@ DEMO := projects/gallery/gallery.caustica.json
 SIZE ?= 960x540
 SAMPLES ?= 48
 
-.PHONY: help setup compiler demo test check clean
+.PHONY: help setup compiler demo test mutate check clean
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -33,6 +33,11 @@ demo: setup ## open the demo project, or render out/demo.png where there is no d
 test: ## all tests, headless (installs the test tools that are missing)
 	@scripts/setup.sh --test
 	GALLIVM_PERF=nopt cargo test --release --workspace
+
+# Of the test editor/scene/tests/mutations; `make mutate CASES=1000000` overrides it.
+CASES ?= 100000
+mutate: ## import damaged files (CASES of them; make test runs a share)
+	CAUSTICA_MUTATIONS=$(CASES) cargo test --release -p caustica-scene --test mutations -- --nocapture
 
 # In the release profile, so that the build scripts of the dependencies (glslang's C++ above all) run once for
 # demo, check and test.

@@ -13,11 +13,13 @@ mod error;
 pub(crate) mod geometry;
 pub(crate) mod gltf;
 mod image;
+mod image_guard;
 mod meshopt;
 mod obj;
 mod shapes;
 pub(crate) mod tangents;
 mod uri;
+mod watched;
 
 pub use environment::load_environment;
 pub use error::{ImportError, Warning};

@@ -4,8 +4,9 @@
 use std::io::Cursor;
 use std::sync::Arc;
 
-use super::basis;
-use image::{ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+
+use super::{basis, image_guard};
 
 /// Side of the stand-in image in texels, and of its squares.
 const CHECKER_PX: u32 = 16;
@@ -42,8 +43,13 @@ pub(super) fn decode(bytes: Vec<u8>, max_extent_px: u32) -> Result<Pixels, Strin
     // Decoded at up to 16 bits a channel, with room for the decoder's own copy.
     limits.max_alloc = Some(u64::from(max_extent_px).pow(2) * 16);
     reader.limits(limits);
-    let image = reader.decode().map_err(|error| error.to_string())?;
-    let image = image.into_rgba8();
+    let format = reader.format();
+    let image = image_guard::guarded(|| {
+        let decoder = reader.into_decoder().map_err(|error| error.to_string())?;
+        image_guard::check_size(&decoder, format, bytes.len())?;
+        let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
+        Ok(image.into_rgba8())
+    })?;
     let (width, height) = image.dimensions();
     if width == 0 || height == 0 {
         return Err("it has no texels".to_owned());

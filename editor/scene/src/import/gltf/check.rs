@@ -60,7 +60,7 @@ pub(super) struct Counts {
 pub(super) fn version(root: &Item<'_>) -> Result<(), Fault> {
     root.object()?;
     let Some(asset) = root.child("asset")? else {
-        return Err(root.fault("\"asset\" is missing, so it is no glTF"));
+        return Err(Fault::new("/asset", "\"asset\" is missing, so it is no glTF"));
     };
     for (key, needed) in [("minVersion", false), ("version", true)] {
         let Some(version) = asset.text(key)? else {

@@ -29,38 +29,36 @@ pub(super) fn read(bytes: &[u8], is_glb: bool) -> Result<Container, Fault> {
 }
 
 fn read_binary(bytes: &[u8]) -> Result<Container, Fault> {
-    let fault = |reason: String| Err(Fault::new("", reason));
+    let fault = |at: usize, reason: String| Err(Fault::new(format!("byte {at}"), reason));
     if bytes.get(..4) != Some(MAGIC) {
-        return fault("it does not begin with \"glTF\", so it is no binary glTF".to_owned());
+        return fault(0, "it does not begin with \"glTF\", so it is no binary glTF".to_owned());
     }
     let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
-        return fault(format!("it ends after {} bytes, within its header of {HEADER_BYTES}", bytes.len()));
+        return fault(bytes.len(), format!("it ends within its header of {HEADER_BYTES} bytes"));
     };
     if version != 2 {
-        return fault(format!("it is binary glTF version {version}; version 2 is read"));
+        return fault(4, format!("it is binary glTF version {version}; version 2 is read"));
     }
     let length = length as usize;
     if length > bytes.len() {
-        return fault(format!(
-            "its header says {length} bytes, but there are {}: it was cut off",
-            bytes.len()
-        ));
+        let reason = format!("its header says {length} bytes, but there are {}: it was cut off", bytes.len());
+        return fault(8, reason);
     }
     let (mut json, mut binary) = (None, None);
     let mut at = HEADER_BYTES;
     while at < length {
         let (Some(size), Some(kind)) = (word(bytes, at), word(bytes, at + 4)) else {
-            return fault(format!("the chunk header at byte {at} is cut off"));
+            return fault(at, "the header of a chunk is cut off".to_owned());
         };
         let start = at + CHUNK_HEADER_BYTES;
         let end = start.checked_add(size as usize).filter(|&end| end <= length);
         let Some(end) = end else {
-            return fault(format!("the chunk at byte {at} says {size} bytes and reaches past the end"));
+            return fault(at, format!("the chunk says {size} bytes and reaches past the end"));
         };
         match kind {
             CHUNK_JSON if json.is_none() => json = Some(start..end),
             _ if json.is_none() => {
-                return fault("its first chunk is not JSON".to_owned());
+                return fault(at, "its first chunk is not JSON".to_owned());
             }
             CHUNK_BIN if binary.is_none() => binary = Some(start..end),
             _ => {}
@@ -68,7 +66,7 @@ fn read_binary(bytes: &[u8]) -> Result<Container, Fault> {
         at = end;
     }
     let Some(json) = json.and_then(|range| bytes.get(range)) else {
-        return fault("it has no JSON chunk".to_owned());
+        return fault(HEADER_BYTES, "it has no JSON chunk".to_owned());
     };
     Ok(Container { json: parse(json)?, binary })
 }
@@ -81,12 +79,16 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
 fn parse(bytes: &[u8]) -> Result<Value, Fault> {
     if bytes.starts_with(b"\xEF\xBB\xBF") {
         let reason = "the JSON begins with a byte order mark, which glTF forbids; save it without one";
-        return Err(Fault::new("", reason));
+        return Err(Fault::new("line 1 column 1", reason));
     }
-    serde_json::from_slice(bytes).map_err(|error| {
+    let json: Value = serde_json::from_slice(bytes).map_err(|error| {
         Fault::new(
             format!("line {} column {}", error.line(), error.column()),
             format!("not valid JSON: {error}"),
         )
-    })
+    })?;
+    match json.is_object() {
+        true => Ok(json),
+        false => Err(Fault::new("line 1 column 1", "the JSON is no object, so it is no glTF")),
+    }
 }

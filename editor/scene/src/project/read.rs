@@ -288,7 +288,11 @@ impl Loader<'_> {
             }
             other => other.into(),
         };
-        self.apply(Edit::SetEnvironment(environment))
+        let edit = Edit::SetEnvironment(environment);
+        self.document
+            .apply(edit)
+            .map(|_| ())
+            .map_err(|error| ProjectProblem::Broken(format!("environment: {error}")))
     }
 
     /// Reads the map of an environment, or leaves it without, with a warning.

@@ -22,7 +22,7 @@ pub fn damaged(seed: &Seed, seeds: &[Seed], numbers: &mut Numbers) -> Damaged {
     let mut kinds = Vec::new();
     let other = numbers.pick(seeds);
     let other = numbers.pick(&other.files).1.clone();
-    for _ in 0..=numbers.below(3) {
+    for _ in 0..=numbers.below(2) * numbers.below(3) {
         let kind = match extension(name) {
             "gltf" | "json" if !numbers.one_in(5) => {
                 replace(&mut bytes, |bytes| json::damage(bytes, numbers))

@@ -10,7 +10,7 @@ use caustica_scene::{Document, Local, Project, ProjectProblem};
 use crate::corpus::{Kind, Seed};
 
 /// Reasons that are about a file as a whole and so have no place in it.
-const WHOLE_FILE: [&str; 2] = ["cannot be opened", "the file holds no triangle"];
+const WHOLE_FILE: [&str; 3] = ["cannot be opened", "the file holds no triangle", "there are no spheres and no boxes"];
 
 /// Reads a seed from its folder: true when it loads, false when it is refused with file, place and reason; else what is at fault.
 pub fn of(seed: &Seed, folder: &Path) -> Result<bool, String> {
@@ -45,7 +45,9 @@ pub fn of(seed: &Seed, folder: &Path) -> Result<bool, String> {
                 // JSON errors have lines, contradictions name ids; the others are about the file.
                 let placed = match error.problem {
                     ProjectProblem::Json(_) => text.contains("line "),
-                    ProjectProblem::Broken(reason) => reason.contains(|c: char| c.is_ascii_digit()),
+                    ProjectProblem::Broken(reason) => {
+                        reason.contains(|c: char| c.is_ascii_digit()) || reason.starts_with("environment: ")
+                    }
                     _ => true,
                 };
                 let named = error.file == path && text.contains(&*path.to_string_lossy());

@@ -60,7 +60,8 @@ impl Document {
             return Some(Cow::Borrowed(own));
         };
         let mut posed = with_numbers(own.clone(), Some(numbers));
-        if posed.mode == ShadingMode::Refractive && !is_smooth_glass(&posed) {
+        // A mode that was chosen against the values stays.
+        if posed.mode == ShadingMode::Refractive && is_smooth_glass(own) && !is_smooth_glass(&posed) {
             posed.mode = ShadingMode::Pbr;
         }
         Some(Cow::Owned(posed))

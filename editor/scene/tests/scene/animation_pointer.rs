@@ -42,7 +42,7 @@ impl Clip {
         );
         file.push(
             "materials",
-            json!({"pbrMetallicRoughness": {"roughnessFactor": 0},
+            json!({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
             "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}),
         );
         file.push("cameras", json!({"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}));
@@ -182,7 +182,7 @@ fn glass_that_clouds_over_is_no_glass_any_more() {
     let (mut document, _) = clip.place();
     let id = document.materials().nth(1).unwrap().0;
     assert_eq!(document.material(id).unwrap().mode, ShadingMode::Refractive);
-    for (time_s, mode) in [(0.25, ShadingMode::Refractive), (0.75, ShadingMode::Pbr)] {
+    for (time_s, mode) in [(0.0, ShadingMode::Refractive), (0.25, ShadingMode::Pbr)] {
         document.set_time(Some(time_s));
         document.drain_changes();
         assert_eq!(document.posed_material(id).unwrap().mode, mode);

@@ -4,7 +4,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use caustica_scene::{Document, Edit, EditError, Journal, Project, ProjectError, ProjectMeta, Recovered};
+use caustica_scene::{
+    Document, Edit, EditError, Fingerprint, Journal, Project, ProjectError, ProjectMeta, Recovered,
+    keep_if_changed,
+};
 
 use crate::history::History;
 
@@ -16,6 +19,10 @@ pub struct OpenScene {
     pub(crate) history: History,
     pub(crate) meta: ProjectMeta,
     pub(crate) path: Option<PathBuf>,
+    /// The file as it was read or written last.
+    known_file: Fingerprint,
+    /// Where a file that somebody else had saved was kept, until the user was told.
+    set_aside: Option<PathBuf>,
     /// The project names files outside of its folder that were not read.
     refused: bool,
     /// Grows with everything that may change the picture.
@@ -172,6 +179,7 @@ impl OpenScene {
 
     fn put(&mut self, project: Project, path: Option<PathBuf>) {
         self.refused = !project.outside.is_empty();
+        self.known_file = project.file;
         self.document = Arc::new(project.document);
         self.meta = project.meta;
         self.path = path;
@@ -202,12 +210,27 @@ impl OpenScene {
         }
     }
 
-    /// Saves the project; what the journal held is removed.
+    /// Where the last save has put a file that somebody else had saved meanwhile; once.
+    pub fn take_set_aside(&mut self) -> Option<PathBuf> {
+        self.set_aside.take()
+    }
+
+    /// The project names files outside of its folder that were not read: it gets no permission by being saved.
+    pub fn note_refused(&mut self) {
+        self.refused = true;
+    }
+
+    /// Saves the project; what the journal held is removed. A file that is another one than was read or written last is kept
+    /// under a name of its own.
     ///
     /// # Errors
     /// When the file cannot be written; the old one stays, and so does the journal.
     pub fn save(&mut self, path: &Path) -> Result<(), ProjectError> {
+        if self.path.as_deref() == Some(path) {
+            self.set_aside = keep_if_changed(path, self.known_file)?;
+        }
         let file = Project::save(path, &self.document, &self.meta)?;
+        self.known_file = file;
         self.path = Some(path.to_owned());
         self.history.mark_saved();
         if let Some(journal) = &mut self.journal {

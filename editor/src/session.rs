@@ -322,35 +322,40 @@ impl Session {
         let was_empty = self.scene.document.node_count() == 0;
         let node = files::import(Arc::make_mut(&mut self.scene.document), path, loaded)?;
         let (edit, node) = (node.edit, node.node);
-        let mut with_it = Document::clone(&self.scene.document);
-        with_it.apply(edit.clone())?;
-        room::check(&with_it, self.device.memory_budget())?;
-        self.push(edit)?;
+        self.push_with_room(edit)?;
         if was_empty {
             self.camera = ViewCamera::of_document(&self.scene.document, None, self.aspect());
         }
         Ok(node)
     }
 
+    /// Applies an edit that brings meshes, when the device has room for the scene with them.
+    fn push_with_room(&mut self, edit: Edit) -> anyhow::Result<()> {
+        let mut with_it = Document::clone(&self.scene.document);
+        with_it.apply(edit.clone())?;
+        room::check(&with_it, self.device.memory_budget())?;
+        Ok(self.push(edit)?)
+    }
+
     /// Gives an instance a prefab of its own, a copy of that which it shares with others.
     ///
     /// # Errors
-    /// When the node is no instance, or shares its prefab with none.
-    pub fn make_unique(&mut self, node: NodeId) -> Result<(), EditError> {
+    /// When the node is no instance, or shares its prefab with none, or the scene does not fit on the device with the copy.
+    pub fn make_unique(&mut self, node: NodeId) -> anyhow::Result<()> {
         let edit = Arc::make_mut(&mut self.scene.document).make_unique_edit(node)?;
-        self.push(edit)
+        self.push_with_room(edit)
     }
 
     /// Puts what was loaded in the place of a prefab's source, as one undo step. Instances keep their overrides.
     ///
     /// # Errors
-    /// When it is no model.
+    /// When it is no model, or does not fit on the device; the document stays as it was.
     pub fn replace_source(&mut self, prefab: PrefabId, loaded: Loaded) -> anyhow::Result<()> {
         let Loaded::Model(imported) = loaded else {
             anyhow::bail!("only a model (.gltf, .glb, .obj) can be the source of an instance")
         };
         let edit = Arc::make_mut(&mut self.scene.document).reload_edit(prefab, *imported)?;
-        Ok(self.push(edit)?)
+        self.push_with_room(edit)
     }
 
     /// Saves the project, with camera and settings of the view.

@@ -202,6 +202,23 @@ fn a_variant_of_materials_is_chosen_by_name() {
 }
 
 #[test]
+fn a_picture_takes_the_place_of_no_source() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("cube.gltf"), cube(false)).expect("a file");
+    let sky = folder.path().join("sky.exr");
+    image::Rgb32FImage::from_pixel(4, 2, image::Rgb([0.5, 1.0, 2.0])).save(&sky).expect("a map");
+    let before = std::fs::read(&sky).expect("the map");
+    let arguments = ["-o", "sky.exr", "--samples", "1", "--environment", "sky.exr"];
+    let run = render(folder.path(), "cube.gltf", &arguments);
+    assert!(
+        run.code == Some(1) && run.stderr.contains("sky.exr: is a source of this scene"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(std::fs::read(&sky).expect("the map"), before);
+}
+
+#[test]
 fn an_exr_holds_radiance_and_its_origin() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = render(folder.path(), &gallery(), &["-o", "a.exr", "--samples", "6", "--exposure", "3"]);

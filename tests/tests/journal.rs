@@ -96,6 +96,25 @@ fn a_killed_process_loses_at_most_its_last_edit() {
 }
 
 #[test]
+fn what_another_editor_has_saved_is_kept() {
+    let root = tempfile::tempdir().expect("a folder");
+    let project = root.path().join("scene.caustica.json");
+    OpenScene::new().save(&project).expect("a project");
+    let [mut ours, mut theirs] = ["ours", "theirs"].map(|name| open(&project, &root.path().join(name)).0);
+    let add = |scene: &mut OpenScene, name: &str| {
+        let node = Node::new(name, NodeKind::Group);
+        scene.edit_with(|document| document.add_edit(node, None)).expect("an edit");
+        scene.save(&project).expect("it is saved");
+        scene.take_set_aside()
+    };
+    assert_eq!(add(&mut theirs, "their group"), None);
+    let kept = add(&mut ours, "our group").expect("their file is kept");
+    assert!(std::fs::read_to_string(kept).expect("a file").contains("their group"));
+    assert!(std::fs::read_to_string(&project).expect("a file").contains("our group"));
+    assert_eq!(add(&mut ours, "another"), None, "now it is ours");
+}
+
+#[test]
 fn the_command_line_tells_of_unsaved_changes() {
     let root = tempfile::tempdir().expect("a folder");
     let root = root.path().canonicalize().expect("a folder");

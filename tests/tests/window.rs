@@ -78,7 +78,7 @@ impl<'a> Editor<'a> {
     /// Quits by its key, which asks nothing when nothing is unsaved, and looks for complaints.
     fn quit(mut self) {
         self.desktop.xdotool("key ctrl+q");
-        let status = wait_for("the editor to quit", 30, || self.process.try_wait().expect("the process"));
+        let status = wait_for("the editor to quit", 90, || self.process.try_wait().expect("the process"));
         let log = self.log();
         assert!(status.success(), "{status}\n{log}");
         for word in ["validation", "panicked", "ERROR", "lost"] {
@@ -156,7 +156,7 @@ fn squares(screen: &RgbImage) -> Vec<f64> {
 /// The screen once the picture has come to rest.
 fn settled(editor: &mut Editor<'_>) -> RgbImage {
     let mut last = editor.desktop.screenshot();
-    editor.wait_for("the picture to come to rest", 30, |desktop| {
+    editor.wait_for("the picture to come to rest", 90, |desktop| {
         std::thread::sleep(std::time::Duration::from_millis(700));
         let before = std::mem::replace(&mut last, desktop.screenshot());
         (moved_squares(&before, &last) <= 2).then_some(())
@@ -177,7 +177,7 @@ fn an_object_is_selected_dragged_and_put_back() {
     assert!(outline(&desktop.screenshot()).is_none(), "nothing is selected at first");
 
     desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", MIDDLE[0], MIDDLE[1]));
-    let (handle, before) = editor.wait_for("the outline and the gizmo of the selected cube", 30, |desktop| {
+    let (handle, before) = editor.wait_for("the outline and the gizmo of the selected cube", 90, |desktop| {
         let screen = desktop.screenshot();
         let around = outline(&screen)?;
         Some((red_handle(&screen, around)?, around))
@@ -186,7 +186,7 @@ fn an_object_is_selected_dragged_and_put_back() {
 
     // Along the red axis, which points to the right of the picture.
     desktop.drag(handle, [100, 0]);
-    let after = editor.wait_for("the cube to follow the drag", 30, |desktop| {
+    let after = editor.wait_for("the cube to follow the drag", 90, |desktop| {
         let now = outline(&desktop.screenshot())?;
         (now[0] > before[0] + 30).then_some(now)
     });
@@ -194,12 +194,12 @@ fn an_object_is_selected_dragged_and_put_back() {
 
     // Away from the handle, which is highlighted as long as it is held.
     desktop.xdotool(&format!("mousemove {} {}", WINDOW[0] / 4, WINDOW[1] / 2));
-    editor.wait_for("the drag to end", 30, |desktop| {
+    editor.wait_for("the drag to end", 90, |desktop| {
         let screen = desktop.screenshot();
         red_handle(&screen, outline(&screen)?)
     });
     desktop.xdotool("key ctrl+z");
-    editor.wait_for("undo to put the cube back", 30, |desktop| {
+    editor.wait_for("undo to put the cube back", 90, |desktop| {
         let now = outline(&desktop.screenshot())?;
         now.iter().zip(before).all(|(a, b)| a.abs_diff(b) <= 3).then_some(())
     });
@@ -216,17 +216,17 @@ fn an_animation_plays_and_leaves_the_document_alone() {
     let at_rest = settled(&mut editor);
 
     desktop.xdotool("key space");
-    editor.wait_for("the cube to leave its place", 30, |desktop| {
+    editor.wait_for("the cube to leave its place", 90, |desktop| {
         (moved_squares(&at_rest, &desktop.screenshot()) > 20).then_some(())
     });
     let once = desktop.screenshot();
-    editor.wait_for("the cube to move on", 30, |desktop| {
+    editor.wait_for("the cube to move on", 90, |desktop| {
         (moved_squares(&once, &desktop.screenshot()) > 20).then_some(())
     });
 
     // From the start of the clip, which is where the cube stood, so that the pause is seen in a known place.
     desktop.xdotool("key space key alt+Home");
-    editor.wait_for("the cube at the start of its clip", 30, |desktop| {
+    editor.wait_for("the cube at the start of its clip", 90, |desktop| {
         (moved_squares(&at_rest, &desktop.screenshot()) <= 4).then_some(())
     });
     std::thread::sleep(std::time::Duration::from_millis(1500));
@@ -237,14 +237,14 @@ fn an_animation_plays_and_leaves_the_document_alone() {
     for _ in 0..12 {
         desktop.xdotool("key alt+Right sleep 0.1");
     }
-    editor.wait_for("the steps to be seen", 30, |desktop| {
+    editor.wait_for("the steps to be seen", 90, |desktop| {
         (moved_squares(&at_rest, &desktop.screenshot()) > 20).then_some(())
     });
     desktop.xdotool("key ctrl+z sleep 1");
     assert!(moved_squares(&at_rest, &desktop.screenshot()) > 20, "there was nothing to undo");
     assert_eq!(editor.title(), title, "nothing is unsaved");
     desktop.xdotool("key shift+space");
-    editor.wait_for("the rest pose", 30, |desktop| {
+    editor.wait_for("the rest pose", 90, |desktop| {
         (moved_squares(&at_rest, &desktop.screenshot()) <= 4).then_some(())
     });
     assert!(!editor.log().contains("undone"), "{}", editor.log());
@@ -257,13 +257,13 @@ fn what_a_killed_editor_had_not_saved_is_recovered() {
     let desktop = Desktop::start([1600, 960]);
     let mut editor = Editor::open(&desktop, folder.path(), &cube(false));
     desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", MIDDLE[0], MIDDLE[1]));
-    editor.wait_for("the outline of the cube", 30, |desktop| outline(&desktop.screenshot()));
+    editor.wait_for("the outline of the cube", 90, |desktop| outline(&desktop.screenshot()));
     desktop.xdotool("key h");
     let window = editor.window.clone();
     let is_modified = move |desktop: &Desktop| {
         desktop.xdotool(&format!("getwindowname {window}")).contains('\u{2022}').then_some(())
     };
-    editor.wait_for("the cube to be hidden", 30, is_modified);
+    editor.wait_for("the cube to be hidden", 90, is_modified);
     editor.process.kill().expect("a signal that nothing can catch");
     editor.process.wait().expect("the end");
     drop(editor);
@@ -280,7 +280,7 @@ fn what_a_killed_editor_had_not_saved_is_recovered() {
     assert!(!shows_cube(&settled(&mut again)), "it was hidden");
     // What was done before the end can be undone after it.
     desktop.xdotool("key ctrl+z");
-    again.wait_for("undo to bring the cube back", 30, |desktop| {
+    again.wait_for("undo to bring the cube back", 90, |desktop| {
         shows_cube(&desktop.screenshot()).then_some(())
     });
 }

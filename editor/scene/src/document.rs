@@ -147,7 +147,7 @@ impl Document {
     /// A number that no id of this document has had or will have.
     pub fn allocate_id(&mut self) -> u64 {
         let id = self.next_id;
-        self.next_id += 1;
+        self.next_id = self.next_id.saturating_add(1);
         id
     }
 

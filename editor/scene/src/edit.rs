@@ -236,7 +236,7 @@ pub enum OverrideField {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EditError {
     /// The node is not in the document.
-    #[error("node {0:?} is not in the scene")]
+    #[error("node {} is not in the scene", .0.0)]
     NoNode(NodeId),
     /// The part is not in the prefab, or the node is no instance.
     #[error("{0:?} is no part of an instance in the scene")]

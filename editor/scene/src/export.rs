@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::assets::Environment;
+use crate::assets::{Environment, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId};
 use crate::import::Warning;
@@ -132,11 +132,27 @@ pub fn export_with_progress(
 
 /// A source that was replaced would change the scene that names it.
 fn refuse_sources(document: &Document, path: &Path) -> Result<(), ExportError> {
-    let Ok(real) = path.canonicalize() else { return Ok(()) };
-    let is_same = |source: &Path| source.canonicalize().is_ok_and(|source| source == real);
-    match document.prefabs().any(|(_, prefab)| is_same(&prefab.source)) {
+    match document.is_source(path) {
         true => Err(ExportError::new(path, "is a source of this scene; choose another name")),
         false => Ok(()),
+    }
+}
+
+impl Document {
+    /// Whether a file is what the scene was read from: a model, an image beside it, an environment, a list of shapes.
+    pub fn is_source(&self, path: &Path) -> bool {
+        let Ok(real) = path.canonicalize() else { return false };
+        let is_same = |source: &Path| source.canonicalize().is_ok_and(|source| source == real);
+        let images = |folder: &Path| self.textures().any(|(_, texture)| is_same(&folder.join(&texture.name)));
+        let models = self
+            .prefabs()
+            .any(|(_, prefab)| is_same(&prefab.source) || prefab.source.parent().is_some_and(images));
+        let shapes =
+            self.meshes().filter_map(|(_, mesh)| mesh.shapes()).any(|shapes| match shapes.source() {
+                ShapeSource::File(file) => is_same(&file.path),
+                _ => false,
+            });
+        models || shapes || matches!(self.environment(), Environment::File(file) if is_same(&file.path))
     }
 }
 

@@ -37,6 +37,6 @@ pub use package::{MaterialEntry, PrefabPackage};
 pub use prefab::{PartNode, PartOrderError, PartOverride, PartPath, Prefab, Skin};
 pub use project::{
     Fingerprint, Journal, JournalError, LeftBehind, Project, ProjectError, ProjectMeta, ProjectProblem,
-    Recovered, RecoveredStep, SCHEMA_VERSION,
+    Recovered, RecoveredStep, SCHEMA_VERSION, keep_if_changed,
 };
 pub use transform::{Local, Trs, is_degenerate, rigid};

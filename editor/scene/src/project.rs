@@ -53,6 +53,26 @@ impl Fingerprint {
     }
 }
 
+/// Keeps a project file that is another one by now under a name of its own, which is returned, so that a save does not take away
+/// what somebody else has saved. `known`: the file as it was read or written last.
+///
+/// # Errors
+/// When it cannot be copied.
+pub fn keep_if_changed(path: &Path, known: Fingerprint) -> Result<Option<PathBuf>, ProjectError> {
+    let Ok(bytes) = std::fs::read(path) else { return Ok(None) };
+    let found = Fingerprint::of(&bytes);
+    if found == known {
+        return Ok(None);
+    }
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".other-{:08x}", found.crc32));
+    let kept = path.with_file_name(name);
+    let copied = atomic::write(&kept, &bytes);
+    copied
+        .map(|()| Some(kept))
+        .map_err(|problem| ProjectError { file: path.to_owned(), problem: problem.into() })
+}
+
 /// What a project file holds beside the document. Hand the same one back when saving.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProjectMeta {

@@ -164,8 +164,16 @@ impl Editor {
     fn import(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
         let warnings = warning_count(&loaded);
         let was_empty = self.session.document().node_count() == 0;
+        let left_out = matches!(&loaded, Loaded::Project(project) if !project.outside.is_empty());
         let node = self.session.import(path, loaded)?;
         self.session.end_gesture();
+        if left_out {
+            self.session.scene_mut().note_refused();
+            self.state.toasts.warning(format!(
+                "{} names files outside of its folder, which were not read. Open it by itself to be asked about them.",
+                short(path)
+            ));
+        }
         if let Some(node) = node {
             self.state.selection.set(node.into());
             self.state.outliner.reveal(self.session.document(), node.into());
@@ -242,8 +250,19 @@ impl Editor {
                 self.state.config.remember(path);
                 if !self.session.scene().has_refused() {
                     self.state.config.trust(path);
+                    // At once: a run that is killed has saved it on this machine all the same.
+                    if let Err(error) = self.config().save() {
+                        tracing::warn!("that the project is one of this machine is not kept: {error:#}");
+                    }
                 }
                 self.state.toasts.info(format!("Saved {}.", short(path)));
+                if let Some(kept) = self.session.scene_mut().take_set_aside() {
+                    self.state.toasts.warning(format!(
+                        "Another program had saved {} since it was opened here. What it saved is kept as {}.",
+                        short(path),
+                        short(&kept)
+                    ));
+                }
                 if let Some(then) = self.after_save.take() {
                     self.go_on(then);
                 }

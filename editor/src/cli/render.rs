@@ -67,6 +67,9 @@ pub(super) fn run(
     if let Some(environment) = environment {
         session.push(Edit::SetEnvironment(environment))?;
     }
+    if session.document().is_source(&args.output) {
+        bail!("{}: is a source of this scene; choose another name", args.output.display());
+    }
     if let Some(name) = &args.variant {
         choose_variant(&mut session, name).with_context(|| args.file.display().to_string())?;
     }

@@ -13,7 +13,7 @@ impl Document {
     }
 
     /// The node whose lock an edit would touch. What is locked can still be hidden and shown, and it follows when what is
-    /// above it moves; materials are locked with no node, since they may be shared.
+    /// above it moves; materials and what lies inside of a mesh are locked with no node, since others may share them.
     pub fn locked_against(&self, edit: &Edit) -> Option<NodeId> {
         match edit {
             Edit::SetTransform { target, .. }

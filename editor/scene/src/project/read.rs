@@ -21,6 +21,9 @@ use crate::import::{self, ImportOptions, Warning};
 use crate::node::{Node, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage, package_with_ids};
 
+/// Far more than any scene uses up, and exact in every reader of JSON (RFC 8259, section 6).
+const LARGEST_ID: u64 = 1 << 53;
+
 /// Reads a project.
 pub(super) fn load(
     path: &Path,
@@ -82,6 +85,9 @@ impl<'a> Loader<'a> {
         progress: &dyn Fn(&str, f32),
     ) -> Result<Self, ProjectProblem> {
         let last_id = record.next_id.saturating_sub(1).max(record.largest_id());
+        if last_id > LARGEST_ID {
+            return Err(ProjectProblem::Broken(format!("{last_id} is no id: they go up to {LARGEST_ID}")));
+        }
         let mut loader = Loader {
             path,
             options: options.clone(),

@@ -10,7 +10,8 @@ use caustica_scene::{Document, Local, Project, ProjectProblem};
 use crate::corpus::{Kind, Seed};
 
 /// Reasons that are about a file as a whole and so have no place in it.
-const WHOLE_FILE: [&str; 3] = ["cannot be opened", "the file holds no triangle", "there are no spheres and no boxes"];
+const WHOLE_FILE: [&str; 3] =
+    ["cannot be opened", "the file holds no triangle", "there are no spheres and no boxes"];
 
 /// Reads a seed from its folder: true when it loads, false when it is refused with file, place and reason; else what is at fault.
 pub fn of(seed: &Seed, folder: &Path) -> Result<bool, String> {

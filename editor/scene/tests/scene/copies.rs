@@ -73,9 +73,11 @@ fn places(document: &Document, wanted: impl Fn(&Renderable) -> bool) -> Vec<Stri
 
 #[test]
 fn a_merged_document_stands_beside_what_is_there() {
-    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-    let Scene { mut document, .. } = scene(folders[0].path());
-    let mut other = scene(folders[1].path());
+    let folder = tempfile::tempdir().unwrap();
+    let below = folder.path().join("other");
+    std::fs::create_dir(&below).unwrap();
+    let Scene { mut document, .. } = scene(folder.path());
+    let mut other = scene(&below);
     let own = Material { name: "own".into(), ..Material::default() };
     let shapes = ShapeSource::Sphere { centre: Vec3::ZERO, radius_m: 1.0 };
     let (_, add) = other.document.add_shapes_edit("ball", shapes, &[own], trs(1.0, 0.0, 1.0)).unwrap();
@@ -90,7 +92,7 @@ fn a_merged_document_stands_beside_what_is_there() {
     assert_eq!(places(&document, new), places(&other.document, |_| true));
     assert_eq!(places(&document, |r| !new(r)), places(&before, |_| true));
     assert_eq!(document.node_count(), before.node_count() + other.document.node_count() + 1);
-    assert!(saved_and_read(&document, folders[0].path()) == document);
+    assert!(saved_and_read(&document, folder.path()) == document);
     document.apply(undo).unwrap();
     assert!(document == before);
     let nothing = document.merge_edit(&Document::new(), "nothing").unwrap_err();

@@ -14,7 +14,15 @@ use serde_json::Value;
 
 /// The scene that the stored files hold: what version 1 knew, and of version 2 its shapes.
 fn stored_scene(folder: &Path, version: u64) -> Document {
-    let mut document = edited(folder).document;
+    let scene = edited(folder);
+    let mut document = scene.document;
+    // They came after the files were written; what a file does not say is as it always was.
+    for edit in [
+        Edit::SetVariant { node: scene.second, variant: None },
+        Edit::SetLocked { node: scene.second, locked: false },
+    ] {
+        document.apply(edit).unwrap();
+    }
     if version >= 2 {
         let cloud = ShapeSource::Cloud(Cloud { seed: 7, count: 50, ..Cloud::default() });
         let (_, edit) = document.add_shapes_edit("Dust", cloud, &[], trs(1.0, 0.2, 1.0)).unwrap();
@@ -92,7 +100,15 @@ fn an_edit_changes_few_lines() {
 
 /// A scene that names a model, a text file of shapes and an environment, all in `folder`.
 fn with_files(folder: &Path) -> Document {
-    let mut document = edited(folder).document;
+    let scene = edited(folder);
+    let mut document = scene.document;
+    // They came after the files were written; what a file does not say is as it always was.
+    for edit in [
+        Edit::SetVariant { node: scene.second, variant: None },
+        Edit::SetLocked { node: scene.second, locked: false },
+    ] {
+        document.apply(edit).unwrap();
+    }
     let shapes = folder.join("dust.xyz");
     std::fs::write(&shapes, "0 0 0 1\n1 0 0 1 2 3\n").unwrap();
     let map = folder.join("sky.exr");

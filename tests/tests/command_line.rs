@@ -390,6 +390,23 @@ fn check_accepts_the_demo() {
 }
 
 #[test]
+fn check_of_several_files_goes_on_after_a_bad_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("broken.obj"), "v 0 0 x").expect("a file");
+    std::fs::write(folder.path().join("good.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").expect("a file");
+    let run = caustica(folder.path(), &["check", "broken.obj", "good.obj", "--json"]);
+    assert_eq!(run.code, Some(1), "{}{}", run.stdout, run.stderr);
+    let report = json_of(&run);
+    assert_eq!(report["files_with_errors"], 1);
+    let error = report["files"][0]["error"].as_str().unwrap_or_default();
+    assert!(error.contains("broken.obj: line 1: \"x\" is not a number"), "{error}");
+    assert_eq!((&report["files"][1]["triangles"], &report["files"][1]["errors"]), (&1.into(), &0.into()));
+    assert!(report["files"][1]["milliseconds"].is_number());
+    let run = caustica(folder.path(), &["check", "good.obj", "good.obj"]);
+    assert_eq!((run.code, run.stdout.lines().count()), (Some(0), 3), "{}", run.stdout);
+}
+
+#[test]
 fn models_of_other_hands_render() {
     let Some(assets) = shared_assets() else { return };
     let folder = tempfile::tempdir().expect("a folder");

@@ -50,8 +50,8 @@ struct Tally {
     cases: u64,
     loaded: u64,
     refused: u64,
-    /// By kind of file: cases and refusals.
-    kinds: BTreeMap<&'static str, (u64, u64)>,
+    /// By kind of file: cases, refusals, time.
+    kinds: BTreeMap<&'static str, (u64, u64, Duration)>,
     longest: (Duration, u64, String),
     most_bytes: (usize, u64, String),
     /// The first of each kind, by its words without numbers and names.
@@ -78,7 +78,7 @@ fn run(case: u64, seeds: &[Seed], folder: &Path, running: &Running, tally: &mut 
     let folder = folder.join(&seed.name);
     let damaged = mutate::damaged(seed, seeds, &mut numbers);
     let file = folder.join(&seed.files[damaged.file].0);
-    std::fs::write(&file, &damaged.bytes).unwrap();
+    put(&file, &damaged.bytes);
     let what = format!(
         "case {case}: {} ({} in {})",
         seed.name,
@@ -94,10 +94,11 @@ fn run(case: u64, seeds: &[Seed], folder: &Path, running: &Running, tally: &mut 
     let took = start.elapsed();
     *running.lock().unwrap() = None;
     let bytes = PeakAlloc.peak_usage().saturating_sub(before);
-    std::fs::write(&file, &seed.files[damaged.file].1).unwrap();
+    put(&file, &seed.files[damaged.file].1);
     tally.cases += 1;
     let kind = tally.kinds.entry(seed.kind.name()).or_default();
     kind.0 += 1;
+    kind.2 += took;
     match outcome {
         Ok(Ok(true)) => tally.loaded += 1,
         Ok(Ok(false)) => {
@@ -116,6 +117,12 @@ fn run(case: u64, seeds: &[Seed], folder: &Path, running: &Running, tally: &mut 
     if bytes > tally.most_bytes.0 {
         tally.most_bytes = (bytes, case, what);
     }
+}
+
+/// A new file each time: ext4 waits for the disk where an old one is cut short and written again.
+fn put(file: &Path, bytes: &[u8]) {
+    std::fs::remove_file(file).unwrap();
+    std::fs::write(file, bytes).unwrap();
 }
 
 fn run_all(cases: impl Iterator<Item = u64>, running: &Running) -> Tally {
@@ -156,8 +163,9 @@ fn damaged_files_are_refused_in_words() {
     let tally = worker.join().unwrap();
     let Tally { cases, loaded, refused, kinds, longest, most_bytes, faults } = tally;
     println!("{cases} cases: {loaded} loaded, {refused} refused, {} kinds of faults", faults.len());
-    for (kind, (cases, refused)) in kinds {
-        println!("  {kind}: {cases} cases, {refused} refused");
+    for (kind, (cases, refused, time)) in kinds {
+        let mean_ms = time.as_secs_f64() * 1e3 / cases as f64;
+        println!("  {kind}: {cases} cases, {refused} refused, {mean_ms:.2} ms a case");
     }
     println!("longest: {:.0} ms, {}", longest.0.as_secs_f64() * 1e3, longest.2);
     println!("most memory: {:.1} MiB, {}", most_bytes.0 as f64 / f64::from(1 << 20), most_bytes.2);

@@ -33,6 +33,10 @@ pub fn damaged(seed: &Seed, seeds: &[Seed], numbers: &mut Numbers) -> Damaged {
             _ => raw(&mut bytes, &other, numbers),
         };
         kinds.push(kind);
+        // Repeated repetition would have no end.
+        if bytes.len() > 2 * sound.len() + (64 << 10) {
+            break;
+        }
     }
     Damaged { file, bytes, kinds }
 }

@@ -100,7 +100,12 @@ fn invalid_files_are_refused_or_warned_about_and_never_panic() {
                 assert_sound(&path, imported);
                 println!("{}: loaded, {} warnings", columns[0], imported.warnings.len());
             }
-            Err(error) => println!("{error}"),
+            Err(error) => {
+                // That there is nothing to show has no place.
+                let placed = !error.place.is_empty() || error.reason.contains("no triangle");
+                assert!(placed && error.file == path && !error.reason.is_empty(), "{error}");
+                println!("{error}");
+            }
         }
         let complained = !matches!(&result, Ok(imported) if imported.warnings.is_empty());
         assert!(complained || columns[1] != "refuse", "{line}");

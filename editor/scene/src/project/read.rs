@@ -21,9 +21,6 @@ use crate::import::{self, ImportOptions, Warning};
 use crate::node::{Node, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage, package_with_ids};
 
-/// Far more than any scene uses up, and exact in every reader of JSON (RFC 8259, section 6).
-const LARGEST_ID: u64 = 1 << 53;
-
 /// Reads a project.
 pub(super) fn load(
     path: &Path,
@@ -72,9 +69,8 @@ pub(super) struct Loader<'a> {
     outside: Vec<PathBuf>,
 }
 
-fn broken(error: EditError) -> ProjectProblem {
-    ProjectProblem::Broken(error.to_string())
-}
+/// Beyond it a file leaves no room for ids that the document gives out.
+const MOST_ID: u64 = 1 << 62;
 
 impl<'a> Loader<'a> {
     /// The document of a project that stands at `path`.
@@ -85,8 +81,8 @@ impl<'a> Loader<'a> {
         progress: &dyn Fn(&str, f32),
     ) -> Result<Self, ProjectProblem> {
         let last_id = record.next_id.saturating_sub(1).max(record.largest_id());
-        if last_id > LARGEST_ID {
-            return Err(ProjectProblem::Broken(format!("{last_id} is no id: they go up to {LARGEST_ID}")));
+        if last_id > MOST_ID {
+            return Err(ProjectProblem::Broken(format!("id {last_id} leaves no room for others")));
         }
         let mut loader = Loader {
             path,
@@ -136,7 +132,9 @@ impl Loader<'_> {
         self.warnings.push(Warning { file: self.path.to_owned(), place, message });
     }
 
-    fn apply(&mut self, edit: Edit) -> Result<(), ProjectProblem> {
+    /// `place` is what of the file the edit stands for.
+    fn apply(&mut self, place: &str, edit: Edit) -> Result<(), ProjectProblem> {
+        let broken = |error: EditError| ProjectProblem::Broken(format!("{place}: {error}"));
         self.document.apply(edit).map(|_| ()).map_err(broken)
     }
 
@@ -165,7 +163,7 @@ impl Loader<'_> {
             Ok(()) => self.import(placeholder(&record, source)),
             Err(reason) => self.without_source(placeholder(&record, source), reason),
         };
-        self.apply(Edit::AddPrefab(Box::new(package)))
+        self.apply(&format!("prefab {}", record.id.0), Edit::AddPrefab(Box::new(package)))
     }
 
     /// Imports the source of a placeholder, which stays in its place when the source cannot be read.
@@ -202,7 +200,7 @@ impl Loader<'_> {
             let entry = MaterialEntry { value, original: None };
             Edit::AddMaterial { material: id, entry: Box::new(entry) }
         };
-        self.apply(edit)
+        self.apply(&format!("material {}", id.0), edit)
     }
 
     /// Spheres and boxes are made anew from their description. A file that is missing is kept on save.
@@ -294,11 +292,7 @@ impl Loader<'_> {
             }
             other => other.into(),
         };
-        let edit = Edit::SetEnvironment(environment);
-        self.document
-            .apply(edit)
-            .map(|_| ())
-            .map_err(|error| ProjectProblem::Broken(format!("environment: {error}")))
+        self.apply("environment", Edit::SetEnvironment(environment))
     }
 
     /// Reads the map of an environment, or leaves it without, with a warning.
@@ -330,7 +324,7 @@ impl Loader<'_> {
                 .map(|part| Target::part(record.node, part)),
         };
         match target {
-            Some(target) => self.apply(Edit::SetDefaultCamera(Some(target))),
+            Some(target) => self.apply("camera", Edit::SetDefaultCamera(Some(target))),
             None => {
                 let message = "the chosen camera is no longer in the source".to_owned();
                 self.warn("camera".to_owned(), message);

@@ -156,8 +156,8 @@ fn written() -> Vec<Seed> {
     ];
     for (name, bytes) in [
         ("8-bit rgba.png", png),
-        ("grey.png", encoded(&DynamicImage::from(rgba(16, 3)).into_luma8().into(), ImageFormat::Png)),
-        ("16-bit.png", encoded(&DynamicImage::from(rgba(5, 5)).into_rgb16().into(), ImageFormat::Png)),
+        ("grey.png", encoded(&rgba(16, 3).into_luma8().into(), ImageFormat::Png)),
+        ("16-bit.png", encoded(&rgba(5, 5).into_rgb16().into(), ImageFormat::Png)),
         (
             "colour.jpeg",
             encoded(

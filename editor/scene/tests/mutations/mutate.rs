@@ -5,6 +5,9 @@ use crate::corpus::Seed;
 use crate::json;
 use crate::numbers::Numbers;
 
+/// Bytes that a repetition may add.
+const MOST_REPEATED: usize = 1 << 16;
+
 /// A damaged file of a seed.
 pub struct Damaged {
     pub file: usize,
@@ -34,7 +37,7 @@ pub fn damaged(seed: &Seed, seeds: &[Seed], numbers: &mut Numbers) -> Damaged {
         };
         kinds.push(kind);
         // Repeated repetition would have no end.
-        if bytes.len() > 2 * sound.len() + (64 << 10) {
+        if bytes.len() > 2 * sound.len() + MOST_REPEATED {
             break;
         }
     }
@@ -224,14 +227,14 @@ fn lines(bytes: &mut Vec<u8>, numbers: &mut Numbers) -> &'static str {
         }
         2 => {
             let line = lines[at].clone();
-            let times = *numbers.pick(&[1, 2, 1000]);
+            let times = (*numbers.pick(&[1, 2, 1000])).min(1 + MOST_REPEATED / line.len().max(1));
             lines.splice(at..at, std::iter::repeat_n(line, times));
             "line repeated"
         }
         3 => {
             let mut words: Vec<&str> = lines[at].split(' ').collect();
             let copy = words.clone();
-            let times = *numbers.pick(&[1, 2, 3000]);
+            let times = (*numbers.pick(&[1, 2, 3000])).min(1 + MOST_REPEATED / lines[at].len().max(1));
             (0..times).for_each(|_| words.extend(copy.iter().skip(1)));
             lines[at] = words.join(" ");
             "words repeated"

@@ -47,7 +47,9 @@ pub fn of(seed: &Seed, folder: &Path) -> Result<bool, String> {
                 let placed = match error.problem {
                     ProjectProblem::Json(_) => text.contains("line "),
                     ProjectProblem::Broken(reason) => {
-                        reason.contains(|c: char| c.is_ascii_digit()) || reason.starts_with("environment: ")
+                        let named =
+                            ["environment: ", "camera: "].iter().any(|place| reason.starts_with(place));
+                        named || reason.contains(|c: char| c.is_ascii_digit())
                     }
                     _ => true,
                 };

@@ -206,7 +206,7 @@ fn other_files_and_newer_versions_are_refused_in_words() {
         r#"{"caustica": 2, "nextId": 18446744073709551615}"#,
         r#"{"caustica": 2, "nodes": [{"id": 18446744073709551615, "name": ""}]}"#,
     ] {
-        assert!(load(spent).to_string().contains("is no id"), "{}", load(spent));
+        assert!(load(spent).to_string().contains("leaves no room"), "{}", load(spent));
     }
     assert!(matches!(load("no").problem, ProjectProblem::Json(_)));
     let twice = r#"{"caustica":1,"nodes":[{"id":1,"name":"a"},{"id":1,"name":"b"}]}"#;

@@ -4,7 +4,7 @@
 In: the program, the folder, and which pipeline. Out: the table on standard output; exit code 1 when a file ends the program in
 another way than loading or being refused (exit codes 0 and 1).
 
-    tests/bench/assets.py target/release/caustica ../shared/assets > tests/bench/results/2026-11-28-check-assets.md
+    tests/bench/assets.py target/release/caustica ../shared/assets --pipeline raster
 """
 
 import argparse
@@ -34,6 +34,7 @@ def short(text, folder):
     """An error without the path of the folder, on one line, not too long."""
     line = text.strip().splitlines()[-1] if text.strip() else ""
     line = line.replace(str(folder) + "/", "").removeprefix("error: ").replace("|", "\\|")
+    line = "".join(c if c.isprintable() and c != "\ufffd" else "?" for c in line)
     return line if len(line) <= 110 else line[:107] + "..."
 
 

@@ -396,7 +396,7 @@ fn check_of_several_files_goes_on_after_a_bad_one() {
     std::fs::write(folder.path().join("good.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").expect("a file");
     let run = caustica(folder.path(), &["check", "broken.obj", "good.obj", "--json"]);
     assert_eq!(run.code, Some(1), "{}{}", run.stdout, run.stderr);
-    let report = json_of(&run);
+    let report: Value = serde_json::from_str(&run.stdout).expect("JSON on standard output");
     assert_eq!(report["files_with_errors"], 1);
     let error = report["files"][0]["error"].as_str().unwrap_or_default();
     assert!(error.contains("broken.obj: line 1: \"x\" is not a number"), "{error}");

@@ -128,10 +128,8 @@ impl Renderer {
         let views: Vec<(Camera, [u32; 2])> =
             self.views.values().map(|view| (*view.camera(), view.extent())).collect();
         let at_rest = delta.is_empty() && views == self.last_views;
-        let matrices: Vec<_> =
-            views.iter().map(|(camera, extent)| (CameraMatrices::of(camera, *extent), *extent)).collect();
         self.last_views = views;
-        if self.tables.settle_textures(recorder, at_rest, &matrices)? {
+        if self.tables.settle_textures(recorder, at_rest, &self.last_views)? {
             self.invalidate(Invalidation::Scene, "detail of textures");
         }
         let slot = recorder.slot();

@@ -40,11 +40,10 @@ pub(crate) use snapshot::Snapshot;
 pub(crate) use spatial_order::order_of;
 pub(crate) use table::{Download, Table};
 
-use crate::delta::{InstanceId, MeshId};
+use crate::delta::{Camera, InstanceId, MeshId};
 use crate::error::Result;
 use crate::gpu_types;
 use crate::passes::ScenePasses;
-use crate::view::CameraMatrices;
 
 use deforming::Deforming;
 use draws::Draws;
@@ -167,7 +166,7 @@ impl Tables {
         &mut self,
         recorder: &mut Recorder,
         at_rest: bool,
-        views: &[(CameraMatrices, [u32; 2])],
+        views: &[(Camera, [u32; 2])],
     ) -> Result<bool> {
         self.textures.note(at_rest);
         if !self.textures.may_settle() {

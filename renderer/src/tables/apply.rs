@@ -104,7 +104,9 @@ impl Tables {
         for id in &delta.removed_textures {
             self.textures.remove(*id);
         }
-        self.textures.fit_new(recorder)?;
+        if !delta.textures.is_empty() {
+            self.textures.fit_new(recorder)?;
+        }
         for (id, material) in &delta.materials {
             match self.materials.set(*id, material, &self.textures) {
                 MaterialChange::Values => {}

@@ -7,14 +7,16 @@ use std::collections::BTreeMap;
 use glam::{Affine3A, Vec3};
 
 use super::Tables;
-use crate::delta::TextureId;
+use crate::delta::{Camera, TextureId};
 use crate::view::CameraMatrices;
 
 /// What stands outside of the picture is seen in mirrors and glass at most.
 const OUTSIDE: f32 = 0.25;
 
 /// Walks all instances.
-pub(super) fn sizes_px(tables: &Tables, views: &[(CameraMatrices, [u32; 2])]) -> BTreeMap<TextureId, f32> {
+pub(super) fn sizes_px(tables: &Tables, views: &[(Camera, [u32; 2])]) -> BTreeMap<TextureId, f32> {
+    let views: Vec<(CameraMatrices, [u32; 2])> =
+        views.iter().map(|(camera, extent)| (CameraMatrices::of(camera, *extent), *extent)).collect();
     let mut sizes = BTreeMap::new();
     for (_, slot) in tables.instances.iter().filter(|(_, slot)| tables.instances.is_met(slot.id)) {
         let Ok(mesh) = tables.meshes.get(slot.instance.mesh) else { continue };
@@ -23,7 +25,7 @@ pub(super) fn sizes_px(tables: &Tables, views: &[(CameraMatrices, [u32; 2])]) ->
             if material.textures().next().is_none() {
                 continue;
             }
-            let size = largest(&slot.instance.render_from_mesh, mesh.placed_bounds(index), views);
+            let size = largest(&slot.instance.render_from_mesh, mesh.placed_bounds(index), &views);
             for used in material.textures() {
                 let known = sizes.entry(used.texture).or_insert(size);
                 *known = size.max(*known);
@@ -63,7 +65,7 @@ fn size_px(camera: &CameraMatrices, extent: [u32; 2], centre: Vec3, radius: f32)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::delta::{Camera, Projection};
+    use crate::delta::Projection;
 
     fn camera(projection: Projection) -> CameraMatrices {
         let camera = Camera { projection, render_from_camera: Affine3A::IDENTITY, ..Camera::default() };

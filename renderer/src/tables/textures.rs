@@ -159,9 +159,6 @@ impl Textures {
     /// Uploads what is new. Where not everything has room, what comes after it, structures and targets, comes first:
     /// textures begin with little and get what is left once all is at rest.
     pub(crate) fn fit_new(&mut self, recorder: &mut Recorder) -> Result<()> {
-        if self.by_id.values().all(|entry| entry.image.is_some()) {
-            return Ok(());
-        }
         let (whole, free) = (self.whole_bytes(), self.free_bytes());
         let all_fit = whole <= free / 2 && self.limit_bytes.is_none_or(|limit| whole <= limit);
         let room = if all_fit { whole } else { (free / 4).max(self.bytes()) };

@@ -1,11 +1,11 @@
 //! Carries out edits of instances: the prefab that they show, and the variant of its materials.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Document;
 use crate::edit::{Edit, EditError};
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target};
-use crate::node::NodeKind;
+use crate::node::{Node, NodeKind};
 
 impl Document {
     /// The variant of materials that an instance shows.
@@ -51,7 +51,7 @@ impl Document {
         if let NodeKind::Prefab { variant: shown, .. } = &mut self.node_mut(Target::node(node))?.kind {
             old = std::mem::replace(shown, variant);
         }
-        let varied = self.node(node).map(|node| self.part_states(node).varied).unwrap_or_default();
+        let varied = self.node(node).map(|node| self.varied_materials(node)).unwrap_or_default();
         let mut meshes: BTreeSet<MeshId> = varied.keys().map(|(mesh, _)| *mesh).collect();
         if let Some(slot) = self.slots.get_mut(&node) {
             meshes.extend(slot.parts.varied.keys().map(|(mesh, _)| *mesh));
@@ -63,6 +63,14 @@ impl Document {
         let targets: Vec<Target> = touched.map(|(part, _)| Target::part(node, part)).collect();
         targets.into_iter().for_each(|target| self.report_changed(target));
         Ok(Edit::SetVariant { node, variant: old })
+    }
+
+    /// The materials that the variant of an instance chooses, by mesh and primitive.
+    pub(super) fn varied_materials(&self, node: &Node) -> BTreeMap<(MeshId, u32), MaterialId> {
+        let NodeKind::Prefab { prefab, variant: Some(variant), .. } = &node.kind else {
+            return BTreeMap::new();
+        };
+        self.prefab(*prefab).map(|prefab| prefab.variant_materials(variant)).unwrap_or_default()
     }
 
     /// The material that the variant of an instance chooses for a primitive of a part.

@@ -215,7 +215,7 @@ impl Document {
 
     /// The derived state of an instance, before its transforms are computed.
     pub(super) fn part_states(&self, node: &Node) -> PartStates {
-        let NodeKind::Prefab { prefab, overrides, variant, .. } = &node.kind else {
+        let NodeKind::Prefab { prefab, overrides, .. } = &node.kind else {
             return PartStates::default();
         };
         let Some(prefab) = self.prefabs.get(prefab) else {
@@ -229,7 +229,7 @@ impl Document {
                 .iter()
                 .filter_map(|(path, value)| Some((prefab.part_at(path)?, value.clone())))
                 .collect(),
-            varied: variant.as_ref().map(|name| prefab.variant_materials(name)).unwrap_or_default(),
+            varied: self.varied_materials(node),
             pose: self.pose_of(node),
         }
     }

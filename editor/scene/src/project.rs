@@ -59,7 +59,7 @@ impl Fingerprint {
 /// # Errors
 /// When it cannot be copied.
 pub fn keep_if_changed(path: &Path, known: Fingerprint) -> Result<Option<PathBuf>, ProjectError> {
-    let Ok(bytes) = std::fs::read(path) else { return Ok(None) };
+    let Ok(bytes) = read::read_file(path) else { return Ok(None) };
     let found = Fingerprint::of(&bytes);
     if found == known {
         return Ok(None);

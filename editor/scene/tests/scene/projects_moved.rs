@@ -100,15 +100,7 @@ fn an_edit_changes_few_lines() {
 
 /// A scene that names a model, a text file of shapes and an environment, all in `folder`.
 fn with_files(folder: &Path) -> Document {
-    let scene = edited(folder);
-    let mut document = scene.document;
-    // They came after the files were written; what a file does not say is as it always was.
-    for edit in [
-        Edit::SetVariant { node: scene.second, variant: None },
-        Edit::SetLocked { node: scene.second, locked: false },
-    ] {
-        document.apply(edit).unwrap();
-    }
+    let mut document = edited(folder).document;
     let shapes = folder.join("dust.xyz");
     std::fs::write(&shapes, "0 0 0 1\n1 0 0 1 2 3\n").unwrap();
     let map = folder.join("sky.exr");

@@ -320,9 +320,10 @@ impl Session {
     /// When the edit does not fit, or the scene with it on the device; the document stays as it was.
     pub fn import(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<Option<NodeId>> {
         let was_empty = self.scene.document.node_count() == 0;
-        let node = files::import(Arc::make_mut(&mut self.scene.document), path, loaded)?;
-        let (edit, node) = (node.edit, node.node);
+        let brought = files::import(Arc::make_mut(&mut self.scene.document), path, loaded)?;
+        let (edit, node) = (brought.edit, brought.node);
         self.push_with_room(edit)?;
+        self.scene.meta.keep_of(&brought.kept, Some);
         if was_empty {
             self.camera = ViewCamera::of_document(&self.scene.document, None, self.aspect());
         }
@@ -342,8 +343,11 @@ impl Session {
     /// # Errors
     /// When the node is no instance, or shares its prefab with none, or the scene does not fit on the device with the copy.
     pub fn make_unique(&mut self, node: NodeId) -> anyhow::Result<()> {
-        let edit = Arc::make_mut(&mut self.scene.document).make_unique_edit(node)?;
-        self.push_with_room(edit)
+        let copies = Arc::make_mut(&mut self.scene.document).make_unique_edit(node)?;
+        self.push_with_room(copies.edit.clone())?;
+        let kept = self.scene.meta.clone();
+        self.scene.meta.keep_of(&kept, |id| copies.id_of(id));
+        Ok(())
     }
 
     /// Puts what was loaded in the place of a prefab's source, as one undo step. Instances keep their overrides.

@@ -32,6 +32,7 @@ mod propagate;
 mod report;
 mod surroundings;
 
+pub use copies::Copies;
 pub use place::{Placed, Renderable};
 pub use pose::Driven;
 use pose::Pose;

@@ -28,7 +28,7 @@ pub use assets::{
 };
 pub use audit::{Finding, Severity, Subject, audit};
 pub use changes::{ChangeSet, Content};
-pub use document::{Document, Driven, Placed, Renderable};
+pub use document::{Copies, Document, Driven, Placed, Renderable};
 pub use edit::{Edit, EditError, OverrideField};
 pub use export::{ExportError, ExportFormat, Exported, export, export_with_progress};
 pub use ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};

@@ -2,6 +2,7 @@
 //! Also turns an [`Imported`] file, whose ids are places in its own lists, into one with document ids.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +16,11 @@ use crate::prefab::Prefab;
 use crate::project::PackageRecord;
 use crate::transform::Local;
 
+mod names;
+
+pub(crate) use names::AssetNames;
+use names::Names;
+
 /// A material with what its source says.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MaterialEntry {
@@ -22,6 +28,13 @@ pub struct MaterialEntry {
     pub value: Material,
     /// What the imported file says; `None` for a material made here.
     pub original: Option<Material>,
+}
+
+impl MaterialEntry {
+    /// Whether it differs from its source, or has none.
+    pub fn is_edited(&self) -> bool {
+        self.original.as_ref() != Some(&self.value)
+    }
 }
 
 /// A prefab with its assets. Written as JSON it is named by its source, with ids and edits; what is read of that is a
@@ -41,80 +54,61 @@ pub struct PrefabPackage {
     pub textures: Vec<(TextureId, Texture)>,
 }
 
-/// The ids that the assets of an imported file get, in the order of its lists.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct AssetIds {
-    meshes: Vec<MeshId>,
-    materials: Vec<MaterialId>,
-    textures: Vec<TextureId>,
-}
-
-impl AssetIds {
-    /// Keeps the ids that are there and asks `fresh` for those that are missing.
-    fn fill(&mut self, imported: &Imported, mut fresh: impl FnMut() -> u64) {
-        let Self { meshes, materials, textures } = self;
-        meshes.truncate(imported.meshes.len());
-        materials.truncate(imported.materials.len());
-        textures.truncate(imported.textures.len());
-        meshes.resize_with(imported.meshes.len(), || MeshId(fresh()));
-        materials.resize_with(imported.materials.len(), || MaterialId(fresh()));
-        textures.resize_with(imported.textures.len(), || TextureId(fresh()));
-    }
-
-    fn material(&self, index: MaterialId) -> MaterialId {
-        lookup(&self.materials, index.0).unwrap_or(index)
-    }
-}
-
 fn lookup<T: Copy>(ids: &[T], index: u64) -> Option<T> {
     usize::try_from(index).ok().and_then(|i| ids.get(i)).copied()
 }
 
-/// Puts document ids in the place of list indices.
-fn package(id: PrefabId, imported: Imported, ids: &AssetIds) -> PrefabPackage {
-    let Imported { mut prefab, meshes, materials, textures, .. } = imported;
-    prefab.meshes.clone_from(&ids.meshes);
-    prefab.materials.clone_from(&ids.materials);
-    prefab.textures.clone_from(&ids.textures);
-    prefab.map_animated_materials(|index| ids.material(index));
-    prefab.map_meshes(|index| lookup(&ids.meshes, index.0).unwrap_or(index));
-    let meshes = meshes.into_iter().map(|mut mesh| {
-        for primitive in &mut mesh.primitives {
-            primitive.material = ids.material(primitive.material);
-        }
-        mesh
-    });
-    let materials = materials.into_iter().map(|mut value| {
-        for texture_use in value.texture_slots_mut().flatten() {
-            texture_use.texture = lookup(&ids.textures, texture_use.texture.0).unwrap_or(texture_use.texture);
-        }
-        MaterialEntry { original: Some(value.clone()), value }
-    });
-    PrefabPackage {
-        id,
-        meshes: ids.meshes.iter().copied().zip(meshes).collect(),
-        materials: ids.materials.iter().copied().zip(materials).collect(),
-        textures: ids.textures.iter().copied().zip(textures).collect(),
-        prefab,
-    }
-}
-
-/// Gives an imported file the ids that it had before, and new ones to what is new in it.
+/// Gives an imported file ids: to what is in `old` by the same name those that it has there, to the rest new ones.
 pub(crate) fn package_with_ids(
     document: &mut Document,
     id: PrefabId,
     imported: Imported,
-    (meshes, materials, textures): (&[MeshId], &[MaterialId], &[TextureId]),
+    old: Option<&Prefab>,
 ) -> PrefabPackage {
-    let mut ids =
-        AssetIds { meshes: meshes.to_vec(), materials: materials.to_vec(), textures: textures.to_vec() };
-    ids.fill(&imported, || document.allocate_id());
-    package(id, imported, &ids)
+    let Imported { prefab, meshes, materials, textures, .. } = put_ids(document, imported, old);
+    let materials = materials.into_iter().map(|value| MaterialEntry { original: Some(value.clone()), value });
+    PrefabPackage {
+        id,
+        meshes: prefab.meshes.iter().copied().zip(meshes).collect(),
+        materials: prefab.materials.iter().copied().zip(materials).collect(),
+        textures: prefab.textures.iter().copied().zip(textures).collect(),
+        prefab,
+    }
+}
+
+/// Puts document ids in the place of list indices.
+fn put_ids(document: &mut Document, mut imported: Imported, old: Option<&Prefab>) -> Imported {
+    let now = AssetNames::of(&imported);
+    let before = old.cloned().unwrap_or_default();
+    let mut names = AssetNames::clone(&before.asset_names);
+    let mut ids = |names: &mut Names, before: Vec<u64>, now: Names| {
+        names.keep_ids(&before, now.now, || document.allocate_id()).into_iter()
+    };
+    let before_meshes = before.meshes.iter().map(|id| id.0).collect();
+    let before_materials = before.materials.iter().map(|id| id.0).collect();
+    let before_textures = before.textures.iter().map(|id| id.0).collect();
+    let meshes: Vec<_> = ids(&mut names.meshes, before_meshes, now.meshes).map(MeshId).collect();
+    let materials: Vec<_> =
+        ids(&mut names.materials, before_materials, now.materials).map(MaterialId).collect();
+    let textures: Vec<_> = ids(&mut names.textures, before_textures, now.textures).map(TextureId).collect();
+    let material = |index: MaterialId| lookup(&materials, index.0).unwrap_or(index);
+    imported.prefab.map_animated_materials(material);
+    imported.prefab.map_meshes(|index| lookup(&meshes, index.0).unwrap_or(index));
+    for primitive in imported.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
+        primitive.material = material(primitive.material);
+    }
+    for used in imported.materials.iter_mut().flat_map(Material::texture_slots_mut).flatten() {
+        used.texture = lookup(&textures, used.texture.0).unwrap_or(used.texture);
+    }
+    let prefab = &mut imported.prefab;
+    (prefab.meshes, prefab.materials, prefab.textures) = (meshes, materials, textures);
+    prefab.asset_names = Arc::new(names);
+    imported
 }
 
 impl PrefabPackage {
-    /// Materials that were edited stay as they were edited, primitives that were moved stay moved. Of another file, that holds
-    /// for materials of the same name and meshes with as many primitives.
+    /// Materials that were edited stay as they were edited, primitives that were moved stay moved, of another file where the
+    /// mesh has as many.
     pub(crate) fn keep_edits<'a>(
         &mut self,
         same_file: bool,
@@ -122,10 +116,7 @@ impl PrefabPackage {
         old_mesh: impl Fn(MeshId) -> Option<&'a Mesh>,
     ) {
         for (id, entry) in &mut self.materials {
-            let Some(old) = old_material(*id).filter(|old| old.original.as_ref() != Some(&old.value)) else {
-                continue;
-            };
-            if same_file || old.original.as_ref().is_some_and(|before| before.name == entry.value.name) {
+            if let Some(old) = old_material(*id).filter(|old| old.is_edited()) {
                 entry.value = old.value.clone();
             }
         }
@@ -146,7 +137,7 @@ impl Document {
     /// Gives an imported file ids and returns the edit that adds it as a prefab, without an instance.
     pub fn import_edit(&mut self, imported: Imported) -> (PrefabId, Edit) {
         let id = PrefabId(self.allocate_id());
-        let package = package_with_ids(self, id, imported, (&[], &[], &[]));
+        let package = package_with_ids(self, id, imported, None);
         (id, Edit::AddPrefab(Box::new(package)))
     }
 
@@ -180,19 +171,29 @@ impl Document {
     }
 
     /// The edit that puts a new reading of the source in a prefab's place. Assets keep their ids by their
-    /// place in the file; materials that were edited stay as they were edited, primitives that were moved stay moved. Of
-    /// another file, that holds for materials of the same name and meshes with as many primitives.
+    /// names; materials that were edited stay as they were edited, also when the file has them no more, and primitives
+    /// that were moved stay moved, of another file where the mesh has as many.
     ///
     /// # Errors
     /// When the prefab is not in the document.
     pub fn reload_edit(&mut self, id: PrefabId, imported: Imported) -> Result<Edit, EditError> {
-        let old = self.prefab(id).ok_or_else(|| EditError::NoAsset(format!("prefab {}", id.0)))?;
+        let none = || EditError::NoAsset(format!("prefab {}", id.0));
+        let old = self.prefab(id).ok_or_else(none)?.clone();
         let same_file = old.source == imported.prefab.source;
-        let (meshes, materials, textures) = (old.meshes.clone(), old.materials.clone(), old.textures.clone());
-        let ids = (&meshes[..], &materials[..], &textures[..]);
-        let mut package = package_with_ids(self, id, imported, ids);
+        let mut package = package_with_ids(self, id, imported, Some(&old));
         package.keep_edits(same_file, |id| self.material_entry(id), |id| self.mesh(id));
-        Ok(Edit::ReplacePrefab(Box::new(package)))
+        let stays = |id: &MaterialId| package.prefab.materials.contains(id);
+        let gone = old.materials.iter().filter(|id| !stays(id)).filter_map(|&material| {
+            let entry = self.material_entry(material).filter(|entry| entry.is_edited())?;
+            let entry = Box::new(MaterialEntry { original: None, ..entry.clone() });
+            Some(Edit::AddMaterial { material, entry })
+        });
+        let gone: Vec<Edit> = gone.collect();
+        let replace = Edit::ReplacePrefab(Box::new(package));
+        match gone.is_empty() {
+            true => Ok(replace),
+            false => Ok(Edit::batch(replace.describe(self), std::iter::once(replace).chain(gone).collect())),
+        }
     }
 
     /// Takes a prefab with its assets out as a value; the document keeps it.

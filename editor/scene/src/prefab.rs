@@ -16,6 +16,7 @@ use crate::assets::{Camera, Environment, Light};
 use crate::foreign::{Foreign, Mapping};
 use crate::ids::{MaterialId, MeshId, TextureId};
 use crate::node::RayVisibility;
+use crate::package::AssetNames;
 use crate::transform::Local;
 
 /// One node of an imported file.
@@ -121,6 +122,8 @@ pub struct Prefab {
     pub animations: Vec<Arc<Animation>>,
     /// What its file says and the program does not know.
     pub(crate) foreign: Arc<Foreign>,
+    /// Names of its assets in its file.
+    pub(crate) asset_names: Arc<AssetNames>,
     nodes: Vec<PartNode>,
     subtree_end: Vec<u32>,
     segments: Vec<String>,
@@ -246,6 +249,12 @@ impl Prefab {
                 }
             }
         }
+    }
+
+    /// The meshes that its file has or once had.
+    pub(crate) fn all_meshes(&self) -> impl Iterator<Item = MeshId> + '_ {
+        let gone = self.asset_names.meshes.gone.iter().map(|(id, _)| MeshId(*id));
+        self.meshes.iter().copied().chain(gone)
     }
 
     /// Puts other mesh ids in place.

@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::assets::TextureUse;
 use crate::document::Document;
+use crate::ids::{MaterialId, MeshId, TextureId};
 use crate::import::{ImportOptions, Warning};
 
 pub(crate) mod atomic;
@@ -17,6 +19,7 @@ mod migrate;
 mod paths;
 mod read;
 mod record;
+mod unknown;
 mod write;
 
 pub use journal::{Journal, JournalError, LeftBehind, Recovered, RecoveredStep};
@@ -86,15 +89,39 @@ pub struct ProjectMeta {
 /// What this version does not know or cannot place, kept for the next save.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Kept {
-    top: Map<String, Value>,
-    nodes: BTreeMap<u64, Map<String, Value>>,
-    prefabs: BTreeMap<u64, Map<String, Value>>,
-    materials: BTreeMap<u64, Map<String, Value>>,
-    shapes: BTreeMap<u64, Map<String, Value>>,
+    /// Fields that it does not know.
+    unknown: unknown::Unknown,
+    /// Textures of materials whose source does not have them now, by their slot.
+    textures: BTreeMap<MaterialId, BTreeMap<usize, TextureUse>>,
     /// Moved primitives of meshes that are missing now, as they were in the file.
-    meshes: Vec<record::MeshRecord>,
+    meshes: BTreeMap<MeshId, record::MeshRecord>,
+    /// Paths that mean something on another machine alone, as they stood in the file, by what they lead to here.
+    paths: BTreeMap<PathBuf, String>,
     /// The chosen camera when the part that it names is missing now.
     camera: Option<record::CameraRecord>,
+}
+
+impl ProjectMeta {
+    /// Takes over what another project keeps of things that came from there and have other ids here. `id`: theirs; `None`: not
+    /// brought along.
+    pub fn keep_of(&mut self, other: &Self, id: impl Fn(u64) -> Option<u64>) {
+        let Kept { unknown, textures, meshes, paths, camera: _ } = &other.kept;
+        let copy = |from: &MaterialId, slots: &BTreeMap<usize, TextureUse>| {
+            let slots = slots.iter().filter_map(|(&slot, used)| {
+                Some((slot, TextureUse { texture: TextureId(id(used.texture.0)?), ..*used }))
+            });
+            Some((MaterialId(id(from.0)?), slots.collect()))
+        };
+        let textures: Vec<_> = textures.iter().filter_map(|(from, slots)| copy(from, slots)).collect();
+        let meshes: Vec<_> = meshes
+            .values()
+            .filter_map(|record| Some(record::MeshRecord { id: MeshId(id(record.id.0)?), ..record.clone() }))
+            .collect();
+        self.kept.unknown.copy_elements(unknown, id);
+        self.kept.textures.extend(textures);
+        self.kept.meshes.extend(meshes.into_iter().map(|record| (record.id, record)));
+        self.kept.paths.extend(paths.clone());
+    }
 }
 
 /// Why a project cannot be read or saved.

@@ -106,6 +106,8 @@ pub(super) fn noted_view(meta: &ProjectMeta) -> (Option<ViewCamera>, Option<View
 pub(super) struct Brought {
     pub(super) edit: Edit,
     pub(super) node: Option<NodeId>,
+    /// What the project keeps that it comes from.
+    pub(super) kept: ProjectMeta,
 }
 
 /// Makes the edit that brings a project, a model or an environment into a document.
@@ -114,8 +116,10 @@ pub(super) fn import(document: &mut Document, path: &Path, loaded: Loaded) -> an
         Loaded::Project(project) => {
             let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
             let (name, _) = name.split_once('.').unwrap_or((&name, ""));
-            let (node, edit) = document.merge_edit(&project.document, name)?;
-            Ok(Brought { edit, node: Some(node) })
+            let copies = document.merge_edit(&project.document, name)?;
+            let mut kept = ProjectMeta::default();
+            kept.keep_of(&project.meta, |id| copies.id_of(id));
+            Ok(Brought { edit: copies.edit, node: Some(copies.node), kept })
         }
         Loaded::Model(imported) => {
             let name = imported.prefab.name.clone();
@@ -127,19 +131,21 @@ pub(super) fn import(document: &mut Document, path: &Path, loaded: Loaded) -> an
             {
                 top.name.clone_from(&name);
             }
-            Ok(Brought { edit: Edit::batch(format!("imported {name}"), vec![add, place]), node: Some(node) })
+            let edit = Edit::batch(format!("imported {name}"), vec![add, place]);
+            Ok(Brought { edit, node: Some(node), kept: ProjectMeta::default() })
         }
         Loaded::Shapes(file) => {
             let name =
                 file.path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
             let source = ShapeSource::File(ShapeFile { path: absolute(&file.path), ..file });
             let (node, edit) = shapes_edit(document, &name, source, Local::default())?;
-            Ok(Brought { edit, node: Some(node) })
+            Ok(Brought { edit, node: Some(node), kept: ProjectMeta::default() })
         }
         Loaded::Environment(path, map) => {
             let path = absolute(&path);
             let file = EnvironmentFile { path, rotation_rad: 0.0, scale: 1.0, map: Some(map) };
-            Ok(Brought { edit: Edit::SetEnvironment(Environment::File(file)), node: None })
+            let edit = Edit::SetEnvironment(Environment::File(file));
+            Ok(Brought { edit, node: None, kept: ProjectMeta::default() })
         }
     }
 }

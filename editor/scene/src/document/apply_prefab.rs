@@ -95,13 +95,29 @@ impl Document {
             self.report_removed(node);
         }
         let changed = Brought::of(&old).or_else_of(Brought::of(&package));
+        // What was edited while the source did not have it stood alone, and goes back into the package.
+        let alone =
+            package.materials.iter().map(|(id, _)| *id).filter(|id| !old.prefab.materials.contains(id));
+        let alone: Vec<Edit> = alone
+            .filter_map(|material| {
+                let entry = Box::new(self.material_entry(material)?.clone());
+                Some(Edit::AddMaterial { material, entry })
+            })
+            .collect();
         self.take_package(&old);
         self.insert_package(package);
         for node in instances {
             self.state_parts(node);
         }
         self.report_users(&changed);
-        Ok(Edit::ReplacePrefab(Box::new(old)))
+        let back = Edit::ReplacePrefab(Box::new(old));
+        match alone.is_empty() {
+            true => Ok(back),
+            false => {
+                let label = back.describe(self);
+                Ok(Edit::batch(label, std::iter::once(back).chain(alone).collect()))
+            }
+        }
     }
 
     /// Marks what uses assets of a prefab without being an instance of it: it may have lost them or have them back.

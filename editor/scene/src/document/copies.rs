@@ -2,12 +2,39 @@
 //! In: what is to stand beside what is there. Out: edits, as one step each.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::Document;
 use crate::edit::{Edit, EditError};
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
 use crate::node::{Node, NodeKind, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage};
+
+/// Copies that are to be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Copies {
+    /// Makes them, as one step.
+    pub edit: Edit,
+    /// The new node, or that which gets copies.
+    pub node: NodeId,
+    ids: NewIds,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum NewIds {
+    After(u64),
+    These(BTreeMap<u64, u64>),
+}
+
+impl Copies {
+    /// The id of the copy of what has this id; `None`: there is none.
+    pub fn id_of(&self, id: u64) -> Option<u64> {
+        match &self.ids {
+            NewIds::After(offset) => id.checked_add(*offset),
+            NewIds::These(ids) => ids.get(&id).copied(),
+        }
+    }
+}
 
 /// Other ids in the place of those that something has. Ids of all kinds come from one counter, so one map serves them all.
 type Renumber<'a> = &'a dyn Fn(u64) -> u64;
@@ -18,7 +45,7 @@ impl Document {
     ///
     /// # Errors
     /// When the node is no instance, or the only one of its prefab.
-    pub fn make_unique_edit(&mut self, node: NodeId) -> Result<Edit, EditError> {
+    pub fn make_unique_edit(&mut self, node: NodeId) -> Result<Copies, EditError> {
         let wrong = EditError::WrongKind { target: Target::node(node), wanted: "instance" };
         let old = self.prefab_of(node).ok_or(wrong.clone())?;
         if !self.nodes().any(|(id, other)| id != node && other.prefab() == Some(old)) {
@@ -26,7 +53,7 @@ impl Document {
         }
         let package = self.package_of(old).ok_or(wrong)?;
         let mut fresh = BTreeMap::new();
-        for id in ids_of(&package) {
+        for id in ids_of(&package).chain(package.prefab.asset_names.gone()) {
             fresh.entry(id).or_insert_with(|| self.allocate_id());
         }
         let renumber = |id: u64| fresh.get(&id).copied().unwrap_or(id);
@@ -42,15 +69,15 @@ impl Document {
                 edits.push(Edit::AssignMaterial { target, primitive, material });
             }
         }
-        Ok(Edit::batch(format!("made {} unique", self.display_name(node.into())), edits))
+        let edit = Edit::batch(format!("made {} unique", self.display_name(node.into())), edits);
+        Ok(Copies { edit, node, ids: NewIds::These(fresh) })
     }
 
-    /// The edit that adds everything in another document, below a group of this name when it has several roots, with the id
-    /// of the new node. Its environment and its choice of a camera are left out.
+    /// The edit that adds everything in another document, below a group of this name when it has several roots. Its environment and its choice of a camera are left out.
     ///
     /// # Errors
     /// When there is no node in it, or no number is left for its ids.
-    pub fn merge_edit(&mut self, other: &Document, name: &str) -> Result<(NodeId, Edit), EditError> {
+    pub fn merge_edit(&mut self, other: &Document, name: &str) -> Result<Copies, EditError> {
         let empty = EditError::NoTree(format!("there is nothing in {name}"));
         let offset = self.next_id;
         let last = offset.checked_add(other.next_id).ok_or(EditError::Taken("every id".to_owned()))?;
@@ -84,9 +111,9 @@ impl Document {
             }
             subtree.nodes.insert(0, (group, Node::new(name, NodeKind::Group)));
         }
-        let top = subtree.top().ok_or(empty)?;
+        let node = subtree.top().ok_or(empty)?;
         edits.push(Edit::AddNode { parent: None, index: usize::MAX, subtree });
-        Ok((top, Edit::batch(format!("merged {name}"), edits)))
+        Ok(Copies { edit: Edit::batch(format!("merged {name}"), edits), node, ids: NewIds::After(offset) })
     }
 }
 
@@ -107,6 +134,7 @@ fn renumbered_package(package: PrefabPackage, renumber: Renumber<'_>) -> PrefabP
     prefab.textures.iter_mut().for_each(|id| *id = texture_id(*id));
     prefab.map_meshes(mesh_id);
     prefab.map_animated_materials(material_id);
+    Arc::make_mut(&mut prefab.asset_names).map_gone(renumber);
     PrefabPackage {
         id: PrefabId(renumber(id.0)),
         prefab,

@@ -162,7 +162,7 @@ impl Journal {
     /// Puts the whole scene into a new file, and only then removes the old one.
     fn keep_scene(&mut self, document: &Document, meta: &ProjectMeta) -> io::Result<()> {
         let mut open = self.create()?;
-        let project = write::record_of(absolute_text, document, meta);
+        let project = write::file_of(absolute_text, document, meta);
         let entry = Entry::Scene { project: Box::new(project), left_out: write::left_out(document) };
         let written = line_of(&entry).map_err(io::Error::other).and_then(|line| open.write(&line));
         if written.is_err() {

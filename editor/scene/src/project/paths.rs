@@ -18,8 +18,16 @@ pub(super) enum Refusal {
 /// `path` as seen from the folder of the project; absolute when they have no common root.
 pub(super) fn to_relative(project: &Path, path: &Path) -> String {
     let target = normalized(path);
-    let project = normalized(project);
-    let base = project.parent().unwrap_or(Path::new(""));
+    let base = folder_of(project);
+    // Where one of them goes through a link, the way between what the links lead to may be the shorter one.
+    let inside = || {
+        let (target, base) = (target.canonicalize().ok()?, base.canonicalize().ok()?);
+        target.starts_with(&base).then_some((target, base))
+    };
+    let (target, base) = match target.starts_with(&base) {
+        true => (target, base),
+        false => inside().unwrap_or((target, base)),
+    };
     let target_parts: Vec<Component<'_>> = target.components().collect();
     let base_parts: Vec<Component<'_>> = base.components().collect();
     let common = target_parts.iter().zip(&base_parts).take_while(|(a, b)| a == b).count();
@@ -55,6 +63,12 @@ pub(super) fn resolve(project: &Path, text: &str) -> Result<PathBuf, Refusal> {
         return Err(Refusal::Outside(path));
     }
     Ok(path)
+}
+
+/// Whether a path is of another machine: an address, a share, or a drive where there are none.
+pub(super) fn is_foreign(text: &str) -> bool {
+    let drive = text.as_bytes().get(1) == Some(&b':') && !Path::new(text).is_absolute();
+    drive || is_address(text) || text.starts_with("//") || text.starts_with("\\\\")
 }
 
 /// A path whatever the working folder becomes, as text.

@@ -1,24 +1,26 @@
 //! A project file to a document: bring it to this version, import the prefabs, lay the edits over them.
 //! In: a path. Out: [`Project`]. What is missing becomes a placeholder of the same ids, and a warning.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DAffine3;
 use serde_json::Value;
 
-use super::paths::{Refusal, from_relative, resolve};
+use super::paths::{Refusal, from_relative, is_foreign, resolve};
 use super::record::{
     CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, PrefabRecord, ProjectRecord,
-    ShapeMeshRecord, ShapesRecord, placeholder,
+    ShapeMeshRecord, ShapesRecord, missing_mesh, placeholder,
 };
+use super::unknown::ProjectFile;
 use super::{Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, migrate};
 use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, ShapeSource};
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
-use crate::ids::Target;
+use crate::ids::{MaterialId, MeshId, NodeId, Target};
 use crate::import::{self, ImportOptions, Warning};
-use crate::node::{Node, Subtree};
+use crate::node::{Node, NodeKind, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage, package_with_ids};
 
 /// Reads a project.
@@ -28,7 +30,7 @@ pub(super) fn load(
     progress: &dyn Fn(&str, f32),
 ) -> Result<Project, ProjectProblem> {
     let bytes = read_file(path)?;
-    let loader = Loader::of_record(path, parse(&bytes)?, options, progress)?;
+    let loader = Loader::of_file(path, parse(&bytes)?, options, progress)?;
     let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     progress(&name, 1.0);
     Ok(loader.finish(&format!("opened {name}"), Fingerprint::of(&bytes)))
@@ -43,7 +45,7 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ProjectProblem> {
 }
 
 /// The text of a project file as this version has it.
-pub(super) fn parse(bytes: &[u8]) -> Result<ProjectRecord, ProjectProblem> {
+pub(super) fn parse(bytes: &[u8]) -> Result<ProjectFile, ProjectProblem> {
     let value: Value = serde_json::from_slice(bytes)?;
     let found = value.get("caustica").and_then(Value::as_u64).ok_or(ProjectProblem::NotAProject)?;
     if found > SCHEMA_VERSION {
@@ -51,7 +53,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<ProjectRecord, ProjectProblem> {
     }
     if found == SCHEMA_VERSION {
         // From the text again, because errors then name a line.
-        return Ok(serde_json::from_slice(bytes)?);
+        return Ok(ProjectFile::new(serde_json::from_slice(bytes)?, &value)?);
     }
     serde_json::from_value(migrate::to_newest(found, value)).map_err(|error| {
         // Where the old text has the same fault, the line in it.
@@ -74,12 +76,13 @@ const MOST_ID: u64 = 1 << 62;
 
 impl<'a> Loader<'a> {
     /// The document of a project that stands at `path`.
-    pub fn of_record(
+    pub fn of_file(
         path: &'a Path,
-        record: ProjectRecord,
+        file: ProjectFile,
         options: &ImportOptions,
         progress: &dyn Fn(&str, f32),
     ) -> Result<Self, ProjectProblem> {
+        let ProjectFile { record, unknown } = file;
         let last_id = record.next_id.saturating_sub(1).max(record.largest_id());
         if last_id > MOST_ID {
             return Err(ProjectProblem::Broken(format!("id {last_id} leaves no room for others")));
@@ -92,7 +95,7 @@ impl<'a> Loader<'a> {
             warnings: Vec::new(),
             outside: Vec::new(),
         };
-        loader.meta.kept.top = record.other;
+        loader.meta.kept.unknown = unknown;
         // Before anything new gets an id, so that none in the file is taken.
         loader.document.reserve_ids_up_to(last_id);
         let count = record.prefabs.len().max(1) as f32;
@@ -140,6 +143,10 @@ impl Loader<'_> {
 
     /// Where a path of the project leads, or why it is not followed. Noted when permission could be given.
     fn locate(&mut self, text: &str) -> (PathBuf, Result<(), String>) {
+        if is_foreign(text) {
+            let kept = &mut self.meta.kept.paths;
+            kept.insert(from_relative(self.path, text), text.to_owned());
+        }
         match resolve(self.path, text) {
             Ok(path) => (path, Ok(())),
             Err(Refusal::Outside(path)) if self.options.outside_project => (path, Ok(())),
@@ -155,10 +162,6 @@ impl Loader<'_> {
 
     fn add_prefab(&mut self, record: PrefabRecord) -> Result<(), ProjectProblem> {
         let (source, allowed) = self.locate(&record.source);
-        if !record.other.is_empty() {
-            let kept = &mut self.meta.kept.prefabs;
-            kept.insert(record.id.0, record.other.clone());
-        }
         let package = match allowed {
             Ok(()) => self.import(placeholder(&record, source)),
             Err(reason) => self.without_source(placeholder(&record, source), reason),
@@ -172,8 +175,7 @@ impl Loader<'_> {
         match import::load(&prefab.source, &self.options) {
             Ok(mut imported) => {
                 self.warnings.append(&mut imported.warnings);
-                let ids = (&prefab.meshes[..], &prefab.materials[..], &prefab.textures[..]);
-                let mut package = package_with_ids(&mut self.document, *id, imported, ids);
+                let mut package = package_with_ids(&mut self.document, *id, imported, Some(prefab));
                 package.prefab.name.clone_from(&prefab.name);
                 package
             }
@@ -189,14 +191,15 @@ impl Loader<'_> {
 
     /// An edited material of a prefab, or one made in the program.
     fn add_material(&mut self, record: MaterialRecord) -> Result<(), ProjectProblem> {
-        let MaterialRecord { id, value, other } = record;
-        if !other.is_empty() {
-            self.meta.kept.materials.insert(id.0, other);
-        }
-        let value = self.without_lost_textures(value);
+        let MaterialRecord { id, value } = record;
+        let value = self.without_lost_textures(id, value);
         let edit = if self.document.material(id).is_some() {
             Edit::SetMaterial { material: id, value: Box::new(value) }
         } else {
+            if self.document.prefabs().any(|(_, prefab)| prefab.asset_names.gone().any(|gone| gone == id.0)) {
+                let message = "was edited, but is not in its source any more; the edit is kept on save";
+                self.warn(format!("material {}", value.name), message.to_owned());
+            }
             let entry = MaterialEntry { value, original: None };
             Edit::AddMaterial { material: id, entry: Box::new(entry) }
         };
@@ -205,10 +208,7 @@ impl Loader<'_> {
 
     /// Spheres and boxes are made anew from their description. A file that is missing is kept on save.
     fn add_shapes(&mut self, record: ShapesRecord) -> Result<(), ProjectProblem> {
-        let ShapesRecord { id, mesh: ShapeMeshRecord { name, source, materials }, other } = record;
-        if !other.is_empty() {
-            self.meta.kept.shapes.insert(id.0, other);
-        }
+        let ShapesRecord { id, mesh: ShapeMeshRecord { name, source, materials } } = record;
         let source = match source {
             ShapeSource::File(file) => {
                 let (path, allowed) = self.locate(&file.path.to_string_lossy());
@@ -232,19 +232,23 @@ impl Loader<'_> {
         })
     }
 
-    fn without_lost_textures(&mut self, mut material: Material) -> Material {
-        let mut lost = Vec::new();
-        for slot in material.texture_slots_mut() {
-            let gone = slot.filter(|u| self.document.texture(u.texture).is_none());
-            if let Some(gone) = gone {
-                lost.push(gone.texture.0.to_string());
-                *slot = None;
+    /// Textures that the source does not have now are kept for the next save, in the slots where they were.
+    fn without_lost_textures(&mut self, id: MaterialId, mut material: Material) -> Material {
+        let mut lost = BTreeMap::new();
+        for (slot, place) in material.texture_slots_mut().enumerate() {
+            if let Some(gone) = place.filter(|used| self.document.texture(used.texture).is_none()) {
+                lost.insert(slot, gone);
+                *place = None;
             }
         }
         if !lost.is_empty() {
-            let message =
-                format!("its textures {} are no longer in the source and were taken off", lost.join(", "));
+            let ids: BTreeSet<String> = lost.values().map(|gone| gone.texture.0.to_string()).collect();
+            let ids = ids.into_iter().collect::<Vec<_>>().join(", ");
+            let message = format!(
+                "its textures {ids} are not in the source; it is shown without, and they are kept on save"
+            );
             self.warn(format!("material {}", material.name), message);
+            self.meta.kept.textures.insert(id, lost);
         }
         material
     }
@@ -262,24 +266,54 @@ impl Loader<'_> {
                     format!("mesh {}", record.id.0),
                     format!("primitive {primitive} was moved, but {error}; the move is kept on save"),
                 );
-                self.meta.kept.meshes.push(record);
+                self.meta.kept.meshes.insert(record.id, record);
                 return;
             }
         }
     }
 
-    fn add_node(&mut self, mut record: NodeRecord) -> Result<(), ProjectProblem> {
-        let other = std::mem::take(&mut record.other);
-        if !other.is_empty() {
-            self.meta.kept.nodes.insert(record.id.0, other);
-        }
+    fn add_node(&mut self, record: NodeRecord) -> Result<(), ProjectProblem> {
         let (id, node) = record.into_node();
+        if let Some(parent) = node.parent.filter(|parent| self.document.node(*parent).is_none()) {
+            return Err(ProjectProblem::Broken(format!(
+                "node {}: its parent, node {}, does not stand before it in the file; parents come first, and no node \
+                 is below itself",
+                id.0, parent.0
+            )));
+        }
+        self.stand_in_for_missing(id, &node)?;
         let edit =
             Edit::AddNode { parent: node.parent, index: usize::MAX, subtree: Subtree::single(id, node) };
         self.document
             .apply(edit)
             .map(|_| ())
             .map_err(|error| ProjectProblem::Broken(format!("node {}: {error}", id.0)))
+    }
+
+    /// What a node names and the file does not have stays named; nothing stands in its place.
+    fn stand_in_for_missing(&mut self, id: NodeId, node: &Node) -> Result<(), ProjectProblem> {
+        let (mesh, materials): (Option<MeshId>, Vec<MaterialId>) = match &node.kind {
+            NodeKind::Mesh { mesh, materials, .. } => (Some(*mesh), materials.clone()),
+            NodeKind::Prefab { overrides, .. } => {
+                (None, overrides.values().flat_map(|own| own.materials.values()).copied().collect())
+            }
+            NodeKind::Group | NodeKind::Light(_) | NodeKind::Camera(_) => return Ok(()),
+        };
+        let document = &self.document;
+        let mesh = mesh.filter(|mesh| document.mesh(*mesh).is_none());
+        let materials = materials.into_iter().filter(|material| document.material(*material).is_none());
+        let materials = materials.map(|material| format!("material {}", material.0));
+        let missing: Vec<String> =
+            mesh.iter().map(|mesh| format!("mesh {}", mesh.0)).chain(materials).collect();
+        let place = format!("node {} \"{}\"", id.0, node.name);
+        if !missing.is_empty() {
+            let message = format!("{} is not in the file; it stays named on save", missing.join(", "));
+            self.warn(place.clone(), message);
+        }
+        match mesh {
+            Some(mesh) => self.apply(&place, Edit::AddMesh { mesh, value: Box::new(missing_mesh(mesh)) }),
+            None => Ok(()),
+        }
     }
 
     fn set_environment(&mut self, record: EnvironmentRecord) -> Result<(), ProjectProblem> {
@@ -314,7 +348,9 @@ impl Loader<'_> {
 
     fn choose_camera(&mut self, record: CameraRecord) -> Result<(), ProjectProblem> {
         let target = match &record.part {
-            None => Some(Target::node(record.node)),
+            None => {
+                Some(Target::node(record.node)).filter(|target| self.document.camera_of(*target).is_some())
+            }
             Some(path) => self
                 .document
                 .node(record.node)
@@ -326,7 +362,10 @@ impl Loader<'_> {
         match target {
             Some(target) => self.apply("camera", Edit::SetDefaultCamera(Some(target))),
             None => {
-                let message = "the chosen camera is no longer in the source".to_owned();
+                let message = format!(
+                    "the chosen camera, of node {}, is not there; it stays chosen on save",
+                    record.node.0
+                );
                 self.warn("camera".to_owned(), message);
                 self.meta.kept.camera = Some(record);
                 Ok(())

@@ -1,4 +1,4 @@
-//! What stands in a project file, field by field. Each record keeps the fields that it does not know.
+//! What stands in a project file, field by field; what else stands there is kept by `unknown.rs`.
 //! Knows JSON and the values of the document, not the document. Prefabs and meshes are in `record/assets.rs`.
 
 use std::collections::BTreeMap;
@@ -18,10 +18,10 @@ use crate::transform::{Local, Trs};
 mod assets;
 
 pub(crate) use assets::PackageRecord;
-pub(super) use assets::{PrefabRecord, ShapeMeshRecord, placeholder};
+pub(super) use assets::{PrefabRecord, ShapeMeshRecord, missing_mesh, placeholder};
 
 /// The whole file.
-#[derive(Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct ProjectRecord {
     /// Version of the format.
@@ -50,8 +50,6 @@ pub(crate) struct ProjectRecord {
     pub view: Map<String, Value>,
     #[serde(default)]
     pub render: Map<String, Value>,
-    #[serde(flatten)]
-    pub other: Map<String, Value>,
 }
 
 impl ProjectRecord {
@@ -61,7 +59,7 @@ impl ProjectRecord {
             let meshes = prefab.meshes.iter().map(|id| id.0);
             let materials = prefab.materials.iter().map(|id| id.0);
             let textures = prefab.textures.iter().map(|id| id.0);
-            meshes.chain(materials).chain(textures).chain([prefab.id.0])
+            meshes.chain(materials).chain(textures).chain(prefab.asset_names.gone()).chain([prefab.id.0])
         });
         let materials = self.materials.iter().map(|material| material.id.0);
         let shapes = self.shapes.iter().map(|shapes| shapes.id.0);
@@ -74,8 +72,6 @@ impl ProjectRecord {
 pub(crate) struct MaterialRecord {
     pub id: MaterialId,
     pub value: Material,
-    #[serde(flatten)]
-    pub other: Map<String, Value>,
 }
 
 /// A mesh of spheres and boxes: how they are made, never the shapes themselves.
@@ -84,8 +80,6 @@ pub(crate) struct ShapesRecord {
     pub id: MeshId,
     #[serde(flatten)]
     pub mesh: ShapeMeshRecord,
-    #[serde(flatten)]
-    pub other: Map<String, Value>,
 }
 
 /// The primitives of a mesh that were moved: index to `mesh_from_primitive`, column by column.
@@ -202,8 +196,6 @@ pub(crate) struct NodeRecord {
     pub light: Option<Light>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
-    #[serde(flatten)]
-    pub other: Map<String, Value>,
 }
 
 impl NodeRecord {
@@ -225,7 +217,6 @@ impl NodeRecord {
             weights: Vec::new(),
             light: None,
             camera: None,
-            other: Map::new(),
         };
         match &node.kind {
             NodeKind::Group => {}

@@ -1,52 +1,77 @@
 //! A document as the text of a project file.
 //! In: document and meta. Out: JSON with a fixed order of keys: the same scene gives the same bytes.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::DAffine3;
-use serde_json::{Map, Value};
 
 use super::paths::to_relative;
 use super::record::{
     CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, PrefabRecord, ProjectRecord,
     ShapeMeshRecord, ShapesRecord,
 };
-use super::{ProjectMeta, SCHEMA_VERSION};
-use crate::assets::{Environment, Mesh};
+use super::unknown::ProjectFile;
+use super::{ProjectMeta, ProjectProblem, SCHEMA_VERSION};
+use crate::assets::{Environment, Material, Mesh, ShapeSource};
 use crate::document::Document;
 use crate::edit::Edit;
-use crate::ids::MeshId;
+use crate::ids::{MaterialId, MeshId};
+use crate::package::MaterialEntry;
 
 /// The text of a project that will stand at `path`.
 pub(super) fn to_text(
     path: &Path,
     document: &Document,
     meta: &ProjectMeta,
-) -> Result<String, serde_json::Error> {
+) -> Result<String, ProjectProblem> {
+    if let Some(file) = files(document).find(|file| file.to_str().is_none()) {
+        let shown = file.display();
+        return Err(ProjectProblem::Broken(format!(
+            "the name of {shown}, which is in the scene, is not UTF-8 and cannot be written; rename the file and replace the source"
+        )));
+    }
     let relative = |file: &Path| to_relative(path, file);
-    serde_json::to_string_pretty(&record_of(relative, document, meta)).map(|text| text + "\n")
+    Ok(serde_json::to_string_pretty(&file_of(relative, document, meta))? + "\n")
 }
 
-/// What a project says; `name` writes the paths of files.
-pub(super) fn record_of(
+/// The files that a document names.
+fn files(document: &Document) -> impl Iterator<Item = &Path> {
+    let prefabs = document.prefabs().map(|(_, prefab)| prefab.source.as_path());
+    let shapes = document.meshes().filter_map(|(_, mesh)| match mesh.shapes()?.source() {
+        ShapeSource::File(file) => Some(file.path.as_path()),
+        _ => None,
+    });
+    let environment = match document.environment() {
+        Environment::File(file) => Some(file.path.as_path()),
+        _ => None,
+    };
+    prefabs.chain(shapes).chain(environment)
+}
+
+/// What a project says, with what was in its file besides; `name` writes the paths of files.
+pub(super) fn file_of(
     name: impl Fn(&Path) -> String,
     document: &Document,
     meta: &ProjectMeta,
-) -> ProjectRecord {
+) -> ProjectFile {
+    let name = |file: &Path| meta.kept.paths.get(file).cloned().unwrap_or_else(|| name(file));
+    ProjectFile { record: record_of(name, document, meta), unknown: meta.kept.unknown.clone() }
+}
+
+fn record_of(name: impl Fn(&Path) -> String, document: &Document, meta: &ProjectMeta) -> ProjectRecord {
     ProjectRecord {
         caustica: SCHEMA_VERSION,
         next_id: document.next_id(),
-        prefabs: prefabs(&name, document, meta),
+        prefabs: prefabs(&name, document),
         materials: materials(document, meta),
-        shapes: shapes(&name, document, meta),
+        shapes: shapes(&name, document),
         meshes: meshes(document, meta),
-        nodes: nodes(document, meta),
+        nodes: nodes(document),
         environment: environment(&name, document),
         camera: camera(document, meta),
         view: meta.view.clone(),
         render: meta.render.clone(),
-        other: meta.kept.top.clone(),
     }
 }
 
@@ -76,46 +101,34 @@ fn written_meshes(document: &Document) -> impl Fn(MeshId, &Mesh) -> bool {
     move |id, mesh| mesh.shapes().is_none() || placed.contains(&id)
 }
 
-fn kept(map: &BTreeMap<u64, Map<String, Value>>, id: u64) -> Map<String, Value> {
-    map.get(&id).cloned().unwrap_or_default()
-}
-
-fn prefabs(name: impl Fn(&Path) -> String, document: &Document, meta: &ProjectMeta) -> Vec<PrefabRecord> {
-    let record = |(id, prefab): (crate::PrefabId, &crate::Prefab)| PrefabRecord {
-        other: kept(&meta.kept.prefabs, id.0),
-        ..PrefabRecord::of(id, prefab, name(&prefab.source))
-    };
-    document.prefabs().map(record).collect()
+fn prefabs(name: impl Fn(&Path) -> String, document: &Document) -> Vec<PrefabRecord> {
+    document.prefabs().map(|(id, prefab)| PrefabRecord::of(id, prefab, name(&prefab.source))).collect()
 }
 
 /// Only materials that differ from their source, or have none.
 fn materials(document: &Document, meta: &ProjectMeta) -> Vec<MaterialRecord> {
-    document
-        .materials()
-        .filter(|(id, value)| {
-            let entry = document.material_entry(*id);
-            entry.and_then(|entry| entry.original.as_ref()) != Some(value)
-        })
-        .map(|(id, value)| MaterialRecord {
-            id,
-            value: value.clone(),
-            other: kept(&meta.kept.materials, id.0),
-        })
-        .collect()
+    let is_edited = |id| document.material_entry(id).is_some_and(MaterialEntry::is_edited);
+    let record = |(id, value): (MaterialId, &Material)| {
+        let mut value = value.clone();
+        let kept = meta.kept.textures.get(&id);
+        for (slot, place) in value.texture_slots_mut().enumerate() {
+            *place = place.or_else(|| kept?.get(&slot).copied());
+        }
+        MaterialRecord { id, value }
+    };
+    document.materials().filter(|(id, _)| is_edited(*id)).map(record).collect()
 }
 
-fn shapes(name: impl Fn(&Path) -> String, document: &Document, meta: &ProjectMeta) -> Vec<ShapesRecord> {
+fn shapes(name: impl Fn(&Path) -> String, document: &Document) -> Vec<ShapesRecord> {
     let is_written = written_meshes(document);
-    let record = |(id, mesh): (MeshId, &Mesh)| {
-        let mesh = ShapeMeshRecord::of(mesh, &name)?;
-        Some(ShapesRecord { id, mesh, other: kept(&meta.kept.shapes, id.0) })
-    };
+    let record = |(id, mesh)| Some(ShapesRecord { id, mesh: ShapeMeshRecord::of(mesh, &name)? });
     document.meshes().filter(|(id, mesh)| is_written(*id, mesh)).filter_map(record).collect()
 }
 
 fn meshes(document: &Document, meta: &ProjectMeta) -> Vec<MeshRecord> {
-    let mut records: BTreeMap<_, _> =
-        meta.kept.meshes.iter().map(|record| (record.id, record.clone())).collect();
+    let brought: BTreeSet<MeshId> = document.prefabs().flat_map(|(_, prefab)| prefab.all_meshes()).collect();
+    let mut records = meta.kept.meshes.clone();
+    records.retain(|id, _| brought.contains(id));
     let is_written = written_meshes(document);
     let written = document.meshes().filter(|(id, mesh)| is_written(*id, mesh));
     let moved = written.filter_map(|(id, mesh)| MeshRecord::of(id, mesh));
@@ -123,13 +136,9 @@ fn meshes(document: &Document, meta: &ProjectMeta) -> Vec<MeshRecord> {
     records.into_values().collect()
 }
 
-fn nodes(document: &Document, meta: &ProjectMeta) -> Vec<NodeRecord> {
+fn nodes(document: &Document) -> Vec<NodeRecord> {
     let ids = document.roots().iter().flat_map(|&root| document.subtree_ids(root));
-    ids.filter_map(|id| {
-        let record = NodeRecord::of(id, document.node(id)?);
-        Some(NodeRecord { other: kept(&meta.kept.nodes, id.0), ..record })
-    })
-    .collect()
+    ids.filter_map(|id| Some(NodeRecord::of(id, document.node(id)?))).collect()
 }
 
 fn environment(name: impl Fn(&Path) -> String, document: &Document) -> EnvironmentRecord {

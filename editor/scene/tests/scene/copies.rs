@@ -2,7 +2,8 @@
 
 use crate::common::{PLATE, Scene, scene, trs};
 use caustica_scene::{
-    Document, Edit, EditError, Material, MaterialId, Project, ProjectMeta, Renderable, ShapeSource, Target,
+    Copies, Document, Edit, EditError, Material, MaterialId, Project, ProjectMeta, Renderable, ShapeSource,
+    Target,
 };
 use glam::Vec3;
 
@@ -33,7 +34,7 @@ fn a_unique_instance_goes_its_own_way() {
         document.apply(edit).unwrap();
     }
     let (before, seen) = (document.clone(), document.renderable(plate).unwrap());
-    let edit = document.make_unique_edit(scene.first).unwrap();
+    let edit = document.make_unique_edit(scene.first).unwrap().edit;
     let undo = document.apply(edit).unwrap();
     let renderable = document.renderable(plate).unwrap();
     assert_eq!(renderable.world_from_mesh, seen.world_from_mesh);
@@ -85,7 +86,7 @@ fn a_merged_document_stands_beside_what_is_there() {
     let hide = Edit::SetVisible { target: other.part(PLATE), visible: false };
     other.document.apply(hide).unwrap();
     let before = document.clone();
-    let (top, edit) = document.merge_edit(&other.document, "more").unwrap();
+    let Copies { node: top, edit, .. } = document.merge_edit(&other.document, "more").unwrap();
     let undo = document.apply(edit).unwrap();
     document.update_transforms();
     let new = |r: &Renderable| document.is_within(r.target, top.into());

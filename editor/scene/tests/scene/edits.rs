@@ -33,8 +33,8 @@ fn every_edit(scene: &mut Scene) -> Vec<Edit> {
             .collect(),
     };
     let (_, duplicate) = document.duplicate_edit(group).unwrap();
-    let unique = document.make_unique_edit(first).unwrap();
-    let (_, merged) = document.merge_edit(&document.clone(), "again").unwrap();
+    let unique = document.make_unique_edit(first).unwrap().edit;
+    let merged = document.merge_edit(&document.clone(), "again").unwrap().edit;
     let mut edits = vec![
         Edit::Rename { target: first.into(), name: "other".into() },
         Edit::Rename { target: plate, name: "lid".into() },

@@ -85,8 +85,8 @@ fn all_kinds(root: &Path, kept: &mut Kept, scene: &crate::common::Scene, whole: 
     let (_, copy) = document.duplicate_edit(scene.second).unwrap();
     let (again, import) = document.import_edit(crate::common::model(root));
     let reload = document.reload_edit(scene.prefab, crate::common::model(root)).unwrap();
-    let unique = document.make_unique_edit(scene.first).unwrap();
-    let (_, merged) = document.merge_edit(&document.clone(), "again").unwrap();
+    let unique = document.make_unique_edit(scene.first).unwrap().edit;
+    let merged = document.merge_edit(&document.clone(), "again").unwrap().edit;
     let sphere = ShapeSource::Cloud(caustica_scene::Cloud { count: 5, ..Default::default() });
     let mut edits = vec![
         Edit::SetTransform { target: part, local: trs(0.1 + 0.2, 0.3, 1.0) },

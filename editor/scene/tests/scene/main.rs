@@ -29,6 +29,7 @@ mod obj;
 mod oracle;
 mod projects;
 mod projects_moved;
+mod projects_sources;
 mod rig_damage;
 mod rig_import;
 mod shapes;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::super::Fingerprint;
-use super::super::record::ProjectRecord;
+use super::super::unknown::ProjectFile;
 use crate::edit::Edit;
 
 /// Version of the lines; the edits in them follow the version of the projects.
@@ -36,7 +36,7 @@ pub(super) enum Entry<'a> {
         edit: Cow<'a, Edit>,
     },
     /// The whole scene: what stood before does not matter.
-    Scene { project: Box<ProjectRecord>, left_out: Vec<Edit> },
+    Scene { project: Box<ProjectFile>, left_out: Vec<Edit> },
 }
 
 /// What the edits follow: a project file as it was, and what was in the document besides.

@@ -12,7 +12,7 @@ use crate::assets::{Environment, EnvironmentFile, Mesh, ShapeSource};
 use crate::edit::Edit;
 use crate::import::ImportOptions;
 use crate::project::read::{Loader, parse, read_file};
-use crate::project::record::ProjectRecord;
+use crate::project::unknown::ProjectFile;
 use crate::project::{Fingerprint, Project, ProjectProblem, SCHEMA_VERSION, atomic};
 
 /// The unsaved changes of a process that has died. While this lives no other process sees them.
@@ -67,7 +67,7 @@ pub struct JournalError {
 /// What a journal says, up to its last whole line.
 struct Contents {
     base: Option<Base>,
-    scene: Option<(Box<ProjectRecord>, Vec<Edit>)>,
+    scene: Option<(Box<ProjectFile>, Vec<Edit>)>,
     edits: Vec<Edit>,
     next_id: u64,
     /// Bytes of whole lines.
@@ -167,7 +167,7 @@ impl LeftBehind {
                 (path, record, base.left_out, found)
             }
         };
-        let mut loader = Loader::of_record(loader_path, record, options, progress).map_err(fail)?;
+        let mut loader = Loader::of_file(loader_path, record, options, progress).map_err(fail)?;
         loader.document.reserve_ids_up_to(contents.next_id.saturating_sub(1));
         if !base.is_as_it_was {
             let message = "the file has changed since; the unsaved changes were applied as far as they fit";
@@ -230,7 +230,7 @@ impl Contents {
                 }
                 Entry::Scene { project, left_out } => {
                     contents.edits.clear();
-                    contents.next_id = contents.next_id.max(project.next_id);
+                    contents.next_id = contents.next_id.max(project.record.next_id);
                     contents.scene = Some((project, left_out));
                 }
             }
@@ -247,7 +247,7 @@ struct Found {
 
 /// The project as it was when the journal began: the file itself, or its backup when the process died after a save or when another
 /// one has saved since; else the file as it is now.
-fn find_base(path: &Path, wanted: Fingerprint) -> Result<(ProjectRecord, Found), ProjectProblem> {
+fn find_base(path: &Path, wanted: Fingerprint) -> Result<(ProjectFile, Found), ProjectProblem> {
     let now = read_file(path);
     if let Ok(bytes) = &now
         && Fingerprint::of(bytes) == wanted

@@ -7,13 +7,12 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_json::{Map, Value};
 
 use super::{MaterialRecord, MeshRecord};
 use crate::assets::{Mesh, MeshData, Primitive, ShapeSource};
 use crate::ids::{MaterialId, MeshId, PrefabId, TextureId};
 use crate::import::placeholder_texture;
-use crate::package::{MaterialEntry, PrefabPackage};
+use crate::package::{AssetNames, MaterialEntry, PrefabPackage};
 use crate::prefab::Prefab;
 use crate::{Material, project::paths};
 
@@ -31,8 +30,8 @@ pub(crate) struct PrefabRecord {
     pub materials: Vec<MaterialId>,
     #[serde(default)]
     pub textures: Vec<TextureId>,
-    #[serde(flatten)]
-    pub other: Map<String, Value>,
+    #[serde(default, skip_serializing_if = "AssetNames::is_empty")]
+    pub asset_names: AssetNames,
 }
 
 impl PrefabRecord {
@@ -44,7 +43,7 @@ impl PrefabRecord {
             meshes: prefab.meshes.clone(),
             materials: prefab.materials.clone(),
             textures: prefab.textures.clone(),
-            other: Map::new(),
+            asset_names: AssetNames::clone(&prefab.asset_names),
         }
     }
 }
@@ -67,12 +66,8 @@ pub(crate) struct PackageRecord {
 impl From<PrefabPackage> for PackageRecord {
     fn from(package: PrefabPackage) -> Self {
         let PrefabPackage { id, prefab, meshes, materials, .. } = package;
-        let edited = materials.into_iter().filter(|(_, entry)| entry.original.as_ref() != Some(&entry.value));
-        let record = |(id, entry): (MaterialId, MaterialEntry)| MaterialRecord {
-            id,
-            value: entry.value,
-            other: Map::new(),
-        };
+        let edited = materials.into_iter().filter(|(_, entry)| entry.is_edited());
+        let record = |(id, entry): (MaterialId, MaterialEntry)| MaterialRecord { id, value: entry.value };
         Self {
             missing: prefab.missing,
             edited: edited.map(record).collect(),
@@ -86,7 +81,7 @@ impl From<PackageRecord> for PrefabPackage {
     fn from(record: PackageRecord) -> Self {
         let mut package = placeholder(&record.prefab, PathBuf::from(&record.prefab.source));
         package.prefab.missing = record.missing;
-        for MaterialRecord { id, value, .. } in record.edited {
+        for MaterialRecord { id, value } in record.edited {
             let place = package.materials.iter_mut().find(|(known, _)| *known == id);
             if let Some((_, entry)) = place {
                 entry.value = value;
@@ -163,6 +158,11 @@ impl<'de> Deserialize<'de> for Mesh {
     }
 }
 
+/// A mesh of nothing that stands for one which is not there.
+pub(crate) fn missing_mesh(id: MeshId) -> Mesh {
+    Mesh::new(format!("missing {}", id.0), Arc::new(MeshData::default()), Vec::new())
+}
+
 /// A prefab without parts, with an empty asset behind every id that is known.
 pub(crate) fn placeholder(record: &PrefabRecord, source: PathBuf) -> PrefabPackage {
     let mut prefab = Prefab::new(record.name.clone(), source);
@@ -170,16 +170,15 @@ pub(crate) fn placeholder(record: &PrefabRecord, source: PathBuf) -> PrefabPacka
     prefab.meshes.clone_from(&record.meshes);
     prefab.materials.clone_from(&record.materials);
     prefab.textures.clone_from(&record.textures);
+    prefab.asset_names = Arc::new(record.asset_names.clone());
     let named = |id: u64| format!("missing {id}");
-    let empty = Arc::new(MeshData::default());
-    let mesh = |id: u64| Mesh::new(named(id), Arc::clone(&empty), Vec::new());
     let material = |id: u64| {
         let value = Material { name: named(id), ..Material::default() };
         MaterialEntry { original: Some(value.clone()), value }
     };
     PrefabPackage {
         id: record.id,
-        meshes: record.meshes.iter().map(|&id| (id, mesh(id.0))).collect(),
+        meshes: record.meshes.iter().map(|&id| (id, missing_mesh(id))).collect(),
         materials: record.materials.iter().map(|&id| (id, material(id.0))).collect(),
         textures: record.textures.iter().map(|&id| (id, placeholder_texture(named(id.0)))).collect(),
         prefab,

@@ -132,9 +132,9 @@ impl<'a> Steps<'a> {
             }
             10 if nodes.len() > MOST_NODES / 2 => Edit::RemoveNode { node },
             11 if self.below(4) == 0 => Edit::SetLocked { node, locked: self.below(4) == 0 },
-            11 if self.below(3) == 0 && document.prefabs().count() < 6 => {
-                document.make_unique_edit(node).unwrap_or_else(|_| Edit::batch("none", Vec::new()))
-            }
+            11 if self.below(3) == 0 && document.prefabs().count() < 6 => document
+                .make_unique_edit(node)
+                .map_or_else(|_| Edit::batch("none", Vec::new()), |copies| copies.edit),
             11 => self.removal(document),
             10 | 12..15 => Edit::SetTransform { target, local: self.local() },
             15 => document.add_edit(Node::new("Lamp", NodeKind::Light(self.light())), self.pick(&nodes)).1,

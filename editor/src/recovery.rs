@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use caustica_scene::LeftBehind;
+use caustica_scene::{HeldJournal, LeftBehind};
 
 /// The folder of the journals: `$XDG_DATA_HOME/caustica/journals`, or the same below `~/.local/share`. Not beside the
 /// project, which may lie where nothing can be written, and never where a project names it.
@@ -14,19 +14,31 @@ pub fn folder() -> Option<PathBuf> {
     Some(data.join("caustica").join("journals"))
 }
 
-/// Unsaved changes of processes that have died, newest first.
-pub fn left_behind() -> Vec<LeftBehind> {
-    folder().map(|folder| LeftBehind::find(&folder)).unwrap_or_default()
+/// Unsaved changes of processes that have died, newest first, and journals of those that are alive or just ending.
+pub fn survey() -> (Vec<LeftBehind>, Vec<HeldJournal>) {
+    folder().map(|folder| LeftBehind::survey(&folder)).unwrap_or_default()
 }
 
-/// Says for every file that holds unsaved changes of this project what is in it.
+/// Says for every file that holds unsaved changes of this project what is in it, and whether the project is being edited.
 pub fn unsaved_changes_of(project: &Path) -> Vec<String> {
     let project = std::path::absolute(project).unwrap_or_else(|_| project.to_owned());
-    let left_behind = left_behind();
-    let of_project = left_behind.iter().filter(|left| left.project() == Some(&project));
-    of_project
-        .map(|left| format!("{}; the editor asks whether to recover what is unsaved", describe(left)))
-        .collect()
+    let (left_behind, held) = survey();
+    let left_behind = left_behind.iter().filter(|left| left.project() == Some(&project));
+    let recoverable = left_behind
+        .map(|left| format!("{}; the editor asks whether to recover what is unsaved", describe(left)));
+    let held = held.iter().filter(|held| held.project() == Some(&project));
+    recoverable.chain(held.map(|held| describe_held(&project, held))).collect()
+}
+
+fn describe_held(project: &Path, held: &HeldJournal) -> String {
+    let name = project.file_name().unwrap_or(project.as_os_str()).to_string_lossy();
+    if held.is_ending() {
+        format!(
+            "{name}: has unsaved edits, and its editor is just ending; the next start of the editor asks whether to recover them"
+        )
+    } else {
+        format!("{name}: is being edited; what is unsaved there is not in what was read here")
+    }
 }
 
 /// Such as "room.caustica.json: 12 unsaved edits, 3 minutes ago".

@@ -131,7 +131,16 @@ fn the_command_line_tells_of_unsaved_changes() {
         scene.edit_with(|document| document.add_edit(node, None)).expect("an edit");
     }
     let living = caustica(&root, &["check", "scene.caustica.json"]);
-    assert_eq!(living.stderr, "", "its editor is still open");
+    assert!(living.stderr.contains("scene.caustica.json: is being edited"), "{}", living.stderr);
+    assert_eq!(living.code, Some(0));
+    // As if it belonged to a process that was killed, and that nobody has taken leave of.
+    let mut dead = std::process::Command::new("sleep").arg("600").spawn().expect("a process");
+    dead.kill().expect("a signal that nothing can catch");
+    let journal = std::fs::read_dir(&journals).expect("a folder").next().expect("a journal").expect("a file");
+    std::fs::rename(journal.path(), journals.join(format!("1-{}.journal", dead.id()))).expect("another name");
+    let ending = caustica(&root, &["check", "scene.caustica.json"]);
+    assert!(ending.stderr.contains("its editor is just ending"), "{}", ending.stderr);
+    dead.wait().expect("the end");
     drop(scene);
     for arguments in
         [["check", "scene.caustica.json"].as_slice(), &["export", "scene.caustica.json", "-o", "a.glb"]]

@@ -10,6 +10,7 @@ use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target};
 use crate::node::Subtree;
 use crate::package::{MaterialEntry, PrefabPackage};
+use crate::prefab::Prefab;
 use crate::transform::Local;
 
 /// A change of the document. The journal writes it as JSON, with files named and not written out.
@@ -381,7 +382,7 @@ impl Edit {
                 let prefab_name = document.prefab(*prefab).map_or("", |p| p.name.as_str());
                 format!("removed prefab {}", shown(prefab_name, "", prefab.0))
             }
-            Self::ReplacePrefab(package) => format!("reloaded {}", package.prefab.name),
+            Self::ReplacePrefab(package) => describe_source(document, package),
             Self::Batch { label, edits } if label.is_empty() => {
                 edits.first().map_or_else(String::new, |edit| edit.describe(document))
             }
@@ -425,6 +426,23 @@ fn describe_clip(document: &Document, node: NodeId, clip: ClipChoice) -> String 
             let clip_name = clips.get(index as usize).map_or("", |clip| clip.name.as_str());
             format!("let {name} play {}", shown(clip_name, "clip", index.into()))
         }
+    }
+}
+
+/// The step of a prefab whose source was read again, or that got another one.
+fn describe_source(document: &Document, package: &PrefabPackage) -> String {
+    let file_of =
+        |prefab: &Prefab| prefab.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let old = document.prefab(package.id).unwrap_or(&package.prefab);
+    let name = if old.name.is_empty() { file_of(old) } else { old.name.clone() };
+    let name = shown(&name, "prefab", package.id.0);
+    if old.source == package.prefab.source {
+        format!("reloaded the source of {name}")
+    } else {
+        format!(
+            "replaced the source of {name} by {}",
+            shown(&file_of(&package.prefab), "another", package.id.0)
+        )
     }
 }
 

@@ -36,7 +36,7 @@ pub use node::{Node, NodeKind, RayVisibility, Subtree};
 pub use package::{MaterialEntry, PrefabPackage};
 pub use prefab::{PartNode, PartOrderError, PartOverride, PartPath, Prefab, Skin};
 pub use project::{
-    Fingerprint, Journal, JournalError, LeftBehind, Project, ProjectError, ProjectMeta, ProjectProblem,
-    Recovered, RecoveredStep, SCHEMA_VERSION, keep_if_changed,
+    Fingerprint, HeldJournal, Journal, JournalError, LeftBehind, Project, ProjectError, ProjectMeta,
+    ProjectProblem, Recovered, RecoveredStep, SCHEMA_VERSION, keep_if_changed,
 };
 pub use transform::{Local, Trs, is_degenerate, rigid};

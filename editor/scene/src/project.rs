@@ -22,7 +22,7 @@ mod record;
 mod unknown;
 mod write;
 
-pub use journal::{Journal, JournalError, LeftBehind, Recovered, RecoveredStep};
+pub use journal::{HeldJournal, Journal, JournalError, LeftBehind, Recovered, RecoveredStep};
 pub(crate) use record::{EnvironmentRecord, LocalRecord, NodeRecord, PackageRecord};
 
 /// Version of the format that is written, and the newest that is read. 2: meshes of spheres and boxes.

@@ -12,7 +12,7 @@ use egui_dock::{DockArea, DockState, TabViewer};
 use super::actions::{self, Action};
 use super::export::Exporting;
 use super::files::Loading;
-use super::recovery::Recovering;
+use super::recovery::{Recovering, Watch};
 use crate::dialogs::Dialogs;
 use crate::panels::{self, Cx, bars, overlays};
 use crate::session::Session;
@@ -50,6 +50,8 @@ pub struct Editor {
     /// Files of those that the user wants to hear of later.
     pub(super) later: BTreeSet<PathBuf>,
     pub(super) recovering: Option<Recovering>,
+    /// Journals of processes that may just be ending.
+    pub(super) watch: Watch,
     /// The project that was opened, and files that it names outside of its folder, while the user is asked about them.
     pub(super) outside: Option<(PathBuf, Vec<PathBuf>)>,
     /// Files to import after the present one.
@@ -84,6 +86,7 @@ impl Editor {
             left_behind: Vec::new(),
             later: BTreeSet::new(),
             recovering: None,
+            watch: Watch::default(),
             outside: None,
             waiting: VecDeque::new(),
             audit: None,
@@ -127,6 +130,7 @@ impl Editor {
         self.poll_loading();
         self.poll_exporting();
         self.poll_recovering();
+        self.look_again(&context);
         if let Some(fault) = self.session.scene_mut().take_journal_fault() {
             self.state.toasts.error(fault);
         }

@@ -2,18 +2,52 @@
 //! Enters: what was found. Leaves: a recovered scene, read on a worker, or files that stay as they are.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use caustica_scene::import::ImportOptions;
-use caustica_scene::{JournalError, LeftBehind, Recovered};
+use caustica_scene::{HeldJournal, JournalError, LeftBehind, Recovered};
 use egui::{Align, Context, Id, Layout, Modal, Ui};
 
 use super::editor::Editor;
 use super::files::{Purpose, short};
-use crate::recovery::{describe, left_behind};
+use crate::recovery::{describe, survey};
 use crate::worker::{Answer, Job, Progress};
 
 /// Most files that a question lists.
 const MOST_LISTED: usize = 6;
+
+/// How often, and how many times, journals are looked at again that another process held.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+const LOOKS: u32 = 20;
+
+/// Journals that other processes held. One that was killed keeps its own for a while: an editor that is started again at once
+/// must not miss what it leaves.
+#[derive(Default)]
+pub(super) struct Watch {
+    held: Vec<HeldJournal>,
+    looks_left: u32,
+    next: Option<Instant>,
+}
+
+impl Watch {
+    fn begin(held: Vec<HeldJournal>) -> Self {
+        Self { held, looks_left: LOOKS, next: Instant::now().checked_add(LOOK_EVERY) }
+    }
+
+    /// What was left behind since the last look, and how long until the next one; `None`: there is none.
+    fn look(&mut self, now: Instant) -> (Vec<LeftBehind>, Option<Duration>) {
+        let mut found = Vec::new();
+        if self.next.is_some_and(|next| next <= now) {
+            found = HeldJournal::look_again(&mut self.held);
+            self.looks_left = self.looks_left.saturating_sub(1);
+            self.next = now.checked_add(LOOK_EVERY);
+        }
+        if self.held.is_empty() || self.looks_left == 0 {
+            self.next = None;
+        }
+        (found, self.next.map(|next| next.saturating_duration_since(now)))
+    }
+}
 
 /// Unsaved changes that are being read.
 pub(super) struct Recovering {
@@ -28,23 +62,46 @@ impl Recovering {
 }
 
 impl Editor {
-    /// Looks for unsaved changes that other runs have left behind, and asks about them.
+    /// Looks for unsaved changes that other runs have left behind, and asks about them; for some seconds also about those of
+    /// runs that are still ending.
     pub fn ask_about_left_behind(&mut self) {
         self.later.clear();
-        self.left_behind = left_behind();
-        for left in &self.left_behind {
-            tracing::info!("left behind: {}", describe(left));
-        }
+        self.left_behind.clear();
+        let (left_behind, held) = survey();
+        self.watch = Watch::begin(held);
+        self.ask_about(left_behind);
     }
 
     /// Asks about unsaved changes of a project that was just opened, unless the user wants to hear of them later.
     pub(super) fn ask_about_left_behind_of(&mut self, project: &Path) {
-        if self.left_behind.is_empty() {
-            let project = std::path::absolute(project).unwrap_or_else(|_| project.to_owned());
-            self.left_behind = left_behind();
-            self.left_behind
-                .retain(|left| left.project() == Some(&project) && !self.later.contains(left.path()));
+        if !self.left_behind.is_empty() {
+            return;
         }
+        let project = std::path::absolute(project).unwrap_or_else(|_| project.to_owned());
+        let (mut left_behind, mut held) = survey();
+        left_behind.retain(|left| left.project() == Some(&project) && !self.later.contains(left.path()));
+        held.retain(|held| held.project() == Some(&project) && !self.watch.held.contains(held));
+        if !held.is_empty() {
+            held.append(&mut self.watch.held);
+            self.watch = Watch::begin(held);
+        }
+        self.ask_about(left_behind);
+    }
+
+    /// Asks about what processes have left behind that were still ending at the last look.
+    pub(super) fn look_again(&mut self, context: &Context) {
+        let (left_behind, next) = self.watch.look(Instant::now());
+        self.ask_about(left_behind);
+        if let Some(delay) = next {
+            context.request_repaint_after(delay);
+        }
+    }
+
+    fn ask_about(&mut self, left_behind: Vec<LeftBehind>) {
+        for left in &left_behind {
+            tracing::info!("left behind: {}", describe(left));
+        }
+        self.left_behind.extend(left_behind);
     }
 
     pub(super) fn ask_to_recover(&mut self, context: &Context) {
@@ -52,12 +109,21 @@ impl Editor {
         let (what, others) = (describe(first), self.left_behind.len() - 1);
         let [recover, discard, later] = ["Recover", "Discard", "Later"];
         let heading = "Recover unsaved changes?";
-        let answer = ask(context, heading, [recover, discard, later], recover, |ui| {
+        // What was left behind may turn up when something was changed here already.
+        let is_modified = self.session.is_modified();
+        let default = if is_modified { later } else { recover };
+        let answer = ask(context, heading, [recover, discard, later], default, |ui| {
             ui.label("The program ended before these changes were saved:");
             ui.add_space(4.0);
             ui.strong(what);
             if others > 0 {
                 ui.weak(format!("and {others} more, which are asked about next"));
+            }
+            if is_modified {
+                ui.add_space(4.0);
+                let text = "The scene that is open has unsaved changes, too. Recovering puts the other one in its place: save first, \
+                            and recover by File > Recover unsaved changes.";
+                ui.colored_label(ui.visuals().warn_fg_color, text);
             }
         });
         if answer == Some(recover) {

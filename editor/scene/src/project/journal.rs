@@ -1,6 +1,6 @@
 //! The journal: what was done since the last save, so that a process that dies loses at most its last edit.
 //! In: every edit that was applied. Out: a file of the program's own folder, one line an edit, locked while the process
-//! lives. What becomes of a file that was left behind is in `journal/left_behind.rs`.
+//! lives. What becomes of a file that was left behind is in `journal/left_behind.rs`, of one that is held in `journal/held.rs`.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -15,9 +15,11 @@ use crate::document::Document;
 use crate::edit::Edit;
 
 mod entry;
+mod held;
 mod left_behind;
 
 use entry::{Base, Entry, line_of};
+pub use held::HeldJournal;
 pub use left_behind::{JournalError, LeftBehind, Recovered, RecoveredStep};
 
 /// Ending of a journal's name.

@@ -311,7 +311,14 @@ fn a_reloaded_source_keeps_overrides_and_ids() {
     nodes.insert(0, caustica_scene::PartNode::default());
     imported.prefab.set_nodes(nodes).unwrap();
     let before = scene.document.clone();
+    let name = scene.document.prefab(scene.prefab).unwrap().name.clone();
+    let mut other = imported.clone();
+    other.prefab.source = folder.path().join("lamp.glb");
+    let edit = scene.document.reload_edit(scene.prefab, other).unwrap();
+    assert_eq!(edit.describe(&scene.document), format!("replaced the source of {name} by lamp.glb"));
     let edit = scene.document.reload_edit(scene.prefab, imported).unwrap();
+    assert_eq!(edit.describe(&scene.document), format!("reloaded the source of {name}"));
+    assert!(!name.is_empty());
     let undo = scene.document.apply(edit).unwrap();
     let target = scene.part(PLATE + 1);
     assert_eq!(scene.document.local(target), Some(moved));

@@ -7,8 +7,8 @@ use crate::common::{LAMP, PLATE, scene, trs};
 use crate::projects::{edited, meta};
 use caustica_scene::import::{ImportOptions, load_environment, load_shapes};
 use caustica_scene::{
-    Document, Edit, Environment, EnvironmentFile, Journal, LeftBehind, Material, MaterialEntry, MaterialId,
-    MeshId, Node, NodeKind, OverrideField, Project, ProjectMeta, Recovered, ShapeSource,
+    Document, Edit, Environment, EnvironmentFile, HeldJournal, Journal, LeftBehind, Material, MaterialEntry,
+    MaterialId, MeshId, Node, NodeKind, OverrideField, Project, ProjectMeta, Recovered, ShapeSource,
 };
 use glam::Vec3;
 
@@ -226,12 +226,18 @@ fn a_living_process_keeps_its_journal_and_saving_ends_it() {
     let rename = |name: &str| Edit::Rename { target: scene.first.into(), name: name.into() };
     assert!(kept.journal.path().is_none(), "nothing is unsaved");
     kept.push(rename("a"));
-    assert!(LeftBehind::find(&kept.folder).is_empty(), "its process lives");
+    let (left, mut held) = LeftBehind::survey(&kept.folder);
+    assert!(left.is_empty(), "its process lives");
+    assert_eq!((held.len(), held[0].project(), held[0].is_ending()), (1, Some(path.as_path()), false));
+    assert!(HeldJournal::look_again(&mut held).is_empty() && held.len() == 1, "it still lives");
     kept.save(&path);
+    assert!(HeldJournal::look_again(&mut held).is_empty() && held.is_empty(), "it has saved");
     assert_eq!(std::fs::read_dir(&kept.folder).unwrap().count(), 0);
     kept.push(rename("b"));
+    let (_, mut held) = LeftBehind::survey(&kept.folder);
     let (document, folder) = kept.die();
-    let left = LeftBehind::find(&folder);
+    let left = HeldJournal::look_again(&mut held);
+    assert!(held.is_empty(), "it has died since");
     assert_eq!((left.len(), left[0].edits, left[0].project()), (1, 1, Some(path.as_path())));
     assert!(LeftBehind::find(&folder).is_empty(), "who found it first has it");
     drop(left);

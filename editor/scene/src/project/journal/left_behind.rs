@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use super::entry::{Base, Entry, VERSION, lines};
+use super::held::HeldJournal;
 use super::{ENDING, Journal, remove};
 use crate::assets::{Environment, EnvironmentFile, Mesh, ShapeSource};
 use crate::edit::Edit;
@@ -64,6 +65,16 @@ pub struct JournalError {
     pub problem: ProjectProblem,
 }
 
+/// What is seen of a journal.
+pub(super) enum Look {
+    /// Another process has locked it.
+    Held,
+    /// There is nothing in it.
+    Nothing,
+    /// Its process has died.
+    Left(LeftBehind),
+}
+
 /// What a journal says, up to its last whole line.
 struct Contents {
     base: Option<Base>,
@@ -78,26 +89,33 @@ impl LeftBehind {
     /// What dead processes have left in a folder, newest first. Empty journals are removed; what cannot be read is left alone
     /// and told of in the log.
     pub fn find(folder: &Path) -> Vec<Self> {
-        let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-        let journals = files.filter(|path| path.extension().is_some_and(|ending| ending == ENDING));
-        let look = |path: PathBuf| match Self::look(&path) {
-            Ok(found) => found,
-            Err(error) => {
-                tracing::warn!("{}: unsaved changes that cannot be read: {error}", path.display());
-                None
-            }
-        };
-        let mut found: Vec<Self> = journals.filter_map(look).collect();
-        found.sort_by(|a, b| b.modified.cmp(&a.modified).then_with(|| b.path.cmp(&a.path)));
-        found
+        Self::survey(folder).0
     }
 
-    /// `None`: its process lives, or there is nothing in it.
-    fn look(path: &Path) -> Result<Option<Self>, ProjectProblem> {
+    /// The same, and the journals that processes hold which are alive or just ending.
+    pub fn survey(folder: &Path) -> (Vec<Self>, Vec<HeldJournal>) {
+        let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let journals = files.filter(|path| path.extension().is_some_and(|ending| ending == ENDING));
+        let (mut found, mut held) = (Vec::new(), Vec::new());
+        for path in journals {
+            match Self::look(&path) {
+                Ok(Look::Left(left)) => found.push(left),
+                Ok(Look::Held) => held.push(HeldJournal::new(&path)),
+                Ok(Look::Nothing) => {}
+                Err(error) => {
+                    tracing::warn!("{}: unsaved changes that cannot be read: {error}", path.display());
+                }
+            }
+        }
+        found.sort_by(|a, b| b.modified.cmp(&a.modified).then_with(|| b.path.cmp(&a.path)));
+        (found, held)
+    }
+
+    pub(super) fn look(path: &Path) -> Result<Look, ProjectProblem> {
         let mut file = OpenOptions::new().read(true).write(true).open(path)?;
         match file.try_lock() {
             Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Ok(None),
+            Err(TryLockError::WouldBlock) => return Ok(Look::Held),
             Err(TryLockError::Error(error)) => return Err(error.into()),
         }
         let bytes = read_all(&mut file)?;
@@ -107,11 +125,11 @@ impl LeftBehind {
         let edits = lines.count();
         if edits == 0 {
             remove(path);
-            return Ok(None);
+            return Ok(Look::Nothing);
         }
         let modified = file.metadata().and_then(|metadata| metadata.modified()).ok();
         let Begin { project, refused, .. } = begin;
-        Ok(Some(Self { path: path.to_owned(), file, project, refused, modified, edits }))
+        Ok(Look::Left(Self { path: path.to_owned(), file, project, refused, modified, edits }))
     }
 
     /// The project file that was open; `None`: the scene was never saved.
@@ -196,14 +214,14 @@ fn read_all(file: &mut File) -> io::Result<Vec<u8>> {
 }
 
 /// The first line of a journal that this version reads.
-struct Begin {
-    project: Option<PathBuf>,
+pub(super) struct Begin {
+    pub(super) project: Option<PathBuf>,
     refused: bool,
     base: Option<Base>,
 }
 
 impl Begin {
-    fn parse(json: &[u8]) -> Result<Self, ProjectProblem> {
+    pub(super) fn parse(json: &[u8]) -> Result<Self, ProjectProblem> {
         match serde_json::from_slice(json)? {
             Entry::Begin { journal, schema, .. } if journal > VERSION || schema > SCHEMA_VERSION => {
                 Err(ProjectProblem::Newer { found: schema.max(journal) })

@@ -66,8 +66,17 @@ pub(crate) struct DeviceArgs {
     #[arg(long, global = true)]
     validation: bool,
     /// Use no more device memory than this: textures go without their largest levels, what cannot fit is refused
-    #[arg(long, value_name = "MIB", global = true)]
+    #[arg(long, value_name = "MIB", global = true, value_parser = parse_budget)]
     memory_budget: Option<u64>,
+}
+
+/// A number of MiB that something may fit into.
+fn parse_budget(text: &str) -> Result<u64, String> {
+    match text.parse() {
+        Ok(0) => Err(String::from("nothing fits into that: give at least 1")),
+        Ok(mib) => Ok(mib),
+        Err(_) => Err(String::from("not a whole number of MiB, at least 1")),
+    }
 }
 
 impl DeviceArgs {

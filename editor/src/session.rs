@@ -8,6 +8,7 @@ mod host_times;
 mod inventory;
 mod room;
 mod tally;
+mod view_size;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -27,6 +28,7 @@ pub use host_times::{HostTimes, Lap};
 pub use tally::Tally;
 
 use self::files::Opened;
+use self::view_size::ViewSize;
 use crate::history::History;
 use crate::open_scene::OpenScene;
 use crate::sync::{Sync, instance_id};
@@ -72,6 +74,7 @@ pub struct Session {
     selection_changed: bool,
     /// The renderer may hold half of a change: it gets the whole scene again.
     resync: bool,
+    view_size: ViewSize,
     profile: ProfileInForce,
     tally: Tally,
     host_times: HostTimes,
@@ -84,6 +87,18 @@ impl Session {
     /// # Errors
     /// When memory runs out or the driver refuses.
     pub fn new(device: &Arc<Device>, options: SessionOptions) -> anyhow::Result<Self> {
+        Self::make(device, options).map_err(|error| {
+            let budget = device.memory_budget();
+            if !view_size::is_out_of_memory(&error) {
+                return error;
+            }
+            let words =
+                format!("not even an empty scene has room in {:.0} MiB", room::mib(budget.budget_bytes));
+            error.context(format!("{words}; {} would help", room::more_memory(budget)))
+        })
+    }
+
+    fn make(device: &Arc<Device>, options: SessionOptions) -> anyhow::Result<Self> {
         let mut frames = Frames::new(device)?;
         let profile = DeviceProfile::in_force(device.name(), device.driver(), device.kind());
         let acceleration =
@@ -108,6 +123,7 @@ impl Session {
             selection: BTreeSet::new(),
             selection_changed: false,
             resync: false,
+            view_size: ViewSize::default(),
             profile,
             tally: Tally::default(),
             host_times: HostTimes::default(),
@@ -237,7 +253,7 @@ impl Session {
             Opened::Project(_, project) => &project.document,
             Opened::Unsaved(document) => document,
         };
-        room::check(document, self.device.memory_budget())?;
+        room::check(room::of_document(document), self.device.memory_budget())?;
         self.empty_renderer()?;
         match opened {
             Opened::Project(path, project) => self.scene.open(path, *project),
@@ -332,9 +348,8 @@ impl Session {
 
     /// Applies an edit that brings meshes, when the device has room for the scene with them.
     fn push_with_room(&mut self, edit: Edit) -> anyhow::Result<()> {
-        let mut with_it = Document::clone(&self.scene.document);
-        with_it.apply(edit.clone())?;
-        room::check(&with_it, self.device.memory_budget())?;
+        let needed = room::with_edit(&self.scene.document, &self.sync, &edit);
+        room::check(needed, self.device.memory_budget())?;
         Ok(self.push(edit)?)
     }
 

@@ -4,6 +4,7 @@
 mod assets;
 mod convert;
 mod deform;
+mod least_bytes;
 mod material;
 mod origin;
 
@@ -16,6 +17,7 @@ use glam::{DAffine3, DVec3};
 use assets::{Assets, InUse};
 use convert::{Maps, light_of, visibility_of};
 pub use convert::{camera_of, instance_id};
+pub use least_bytes::least_bytes;
 use origin::Extents;
 
 /// What the renderer holds of the document so far.
@@ -40,6 +42,16 @@ impl Sync {
     /// World position of the origin of render space, metres.
     pub fn origin(&self) -> DVec3 {
         self.origin
+    }
+
+    /// What all meshes that the renderer holds take at least, bytes.
+    pub fn mesh_bytes(&self) -> u64 {
+        self.assets.mesh_bytes()
+    }
+
+    /// The same of one mesh; 0 when the renderer does not hold it.
+    pub fn mesh_bytes_of(&self, mesh: MeshId) -> u64 {
+        self.assets.mesh_bytes_of(mesh)
     }
 
     /// The delta that takes everything out again, before another document is synced.

@@ -111,7 +111,7 @@ pub struct ViewState {
     pub rect: egui::Rect,
     /// Its size in device pixels; `None` while it is hidden.
     pub extent_px: Option<[u32; 2]>,
-    /// The picture is rendered at this fraction of the device pixels: 1, 2, 3 or 4.
+    /// One pixel is rendered for so many device pixels in each direction: 1 to 4, or up to 8 where memory is short.
     pub divisor: u32,
     /// Distance from the eye to what it orbits.
     pub distance_m: f64,

@@ -307,6 +307,15 @@ impl Renderer {
         passes.prepare(&mut builder, show, window)
     }
 
+    /// Bytes that [`Self::read_back`] takes for a while.
+    ///
+    /// # Errors
+    /// When the view was removed or has no frame yet.
+    pub fn read_back_bytes(&self, id: ViewId) -> Result<u64> {
+        let nothing = || RendererError::Unknown { what: "frame of view", id: id.0.to_string() };
+        Ok(self.view(id)?.accumulator.as_ref().ok_or_else(nothing)?.size())
+    }
+
     /// Reads the accumulated image of a view. Waits for the device.
     ///
     /// # Errors
@@ -314,8 +323,8 @@ impl Renderer {
     pub fn read_back(&mut self, frames: &mut Frames, id: ViewId) -> Result<Accumulated> {
         let nothing = || RendererError::Unknown { what: "frame of view", id: id.0.to_string() };
         let accumulator = self.view(id)?.accumulator.as_ref().ok_or_else(nothing)?;
-        let kind = MemoryUse::Staging;
         let size = accumulator.size();
+        let kind = MemoryUse::Staging;
         let host =
             Buffer::new(&self.device, "read-back", size, BufferUse::General, Location::ReadBack, kind)?;
         let mut recorder = frames.begin()?;

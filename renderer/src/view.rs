@@ -258,6 +258,19 @@ impl View {
         }
     }
 
+    /// What the full resolution is divided by.
+    pub fn divisor(&self) -> u32 {
+        self.divisor
+    }
+
+    /// Lets go of all that can be made anew, with the samples: memory is short. False: there was nothing.
+    pub fn let_go(&mut self) -> bool {
+        let held = self.targets.is_some() || self.retired.is_some() || self.frame_count > 0;
+        self.drop_targets();
+        self.accumulator = None;
+        held
+    }
+
     fn follow_extent(&mut self, reason: &str) {
         let extent = self.full_extent.map(|side| side.div_ceil(self.divisor));
         if extent != self.extent {

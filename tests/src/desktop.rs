@@ -52,9 +52,14 @@ impl Desktop {
         let mut command = Command::new(program);
         command.env("DISPLAY", &self.display).env_remove("WAYLAND_DISPLAY");
         for variable in ["XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"] {
-            command.env(variable, self.folder.path().join("settings"));
+            command.env(variable, self.settings());
         }
         command
+    }
+
+    /// Where programs on this display have their settings and their data.
+    pub fn settings(&self) -> PathBuf {
+        self.folder.path().join("settings")
     }
 
     /// Runs xdotool; what it printed.

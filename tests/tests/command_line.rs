@@ -357,11 +357,16 @@ fn wrong_usage_ends_with_2() {
         vec!["render", &gallery, "-o", "a.png", "--pipeline", "magic"],
         vec!["render", &gallery, "-o", "a.png", "--samples", "3", "--time", "1"],
         vec!["--nonsense"],
+        vec!["render", &gallery, "-o", "a.png", "--memory-budget", "0"],
+        vec!["--memory-budget", "much"],
     ] {
         let run = caustica(folder.path(), &arguments);
         assert_eq!(run.code, Some(2), "{arguments:?}: {}", run.stderr);
         assert!(run.stdout.is_empty());
     }
+    let nothing = caustica(folder.path(), &["--memory-budget", "0", "devices"]).stderr;
+    let first = nothing.lines().next().unwrap_or_default();
+    assert!(first.contains("--memory-budget") && first.contains("give at least 1"), "{nothing}");
     let help = caustica(folder.path(), &["--help"]);
     assert_eq!(help.code, Some(0));
     assert!(help.stdout.contains("render"));

@@ -38,6 +38,10 @@ impl<'a> Editor<'a> {
 
     /// Starts on a model, in a window of that size.
     fn start(desktop: &'a Desktop, folder: &Path, gltf: &str) -> Self {
+        Self::start_with(desktop, folder, gltf, &[])
+    }
+
+    fn start_with(desktop: &'a Desktop, folder: &Path, gltf: &str, arguments: &[&str]) -> Self {
         let model = folder.join("cube.gltf");
         std::fs::write(&model, gltf).expect("a model on disk");
         let log_path = folder.join("log.txt");
@@ -45,6 +49,7 @@ impl<'a> Editor<'a> {
         let mut command = desktop.command(program());
         command
             .arg("--validation")
+            .args(arguments)
             .arg(&model)
             .env("CAUSTICA_LOG", "info")
             .env("NO_COLOR", "1")
@@ -268,10 +273,15 @@ fn what_a_killed_editor_had_not_saved_is_recovered() {
     editor.process.wait().expect("the end");
     drop(editor);
 
+    // The system may take its time with the end of a large process, whose journal is locked until then: so it is here.
+    let ending = lock_journal(&desktop);
     let mut again = Editor::start(&desktop, folder.path(), &cube(false));
     let log = again.log.clone();
-    let asks = |_: &Desktop| std::fs::read_to_string(&log).ok()?.contains("left behind").then_some(());
-    again.wait_for("the question", 60, asks);
+    let told = || std::fs::read_to_string(&log).unwrap_or_default().contains("left behind");
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    assert!(!told(), "the one before is still ending");
+    drop(ending);
+    again.wait_for("the question", 15, |_| told().then_some(()));
     let window = again.window.clone();
     again.wait_for("Enter to say: recover", 60, |desktop| {
         desktop.xdotool("key Return sleep 0.5");
@@ -283,4 +293,28 @@ fn what_a_killed_editor_had_not_saved_is_recovered() {
     again.wait_for("undo to bring the cube back", 90, |desktop| {
         shows_cube(&desktop.screenshot()).then_some(())
     });
+}
+
+/// Holds the only journal that there is, as its process does.
+fn lock_journal(desktop: &Desktop) -> std::fs::File {
+    let folder = desktop.settings().join("caustica/journals");
+    let files = std::fs::read_dir(folder).expect("journals").map(|entry| entry.expect("a file").path());
+    let journals: Vec<PathBuf> = files.collect();
+    assert_eq!(journals.len(), 1, "{journals:?}");
+    let file = std::fs::File::open(&journals[0]).expect("a journal");
+    wait_for("its process to let go of it", 20, || file.try_lock().ok());
+    file
+}
+
+#[test]
+fn an_editor_with_little_memory_shows_a_coarse_view_and_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let desktop = Desktop::start([1600, 960]);
+    let little = ["--memory-budget", "96"];
+    let mut editor = Editor::start_with(&desktop, folder.path(), &cube(false), &little);
+    editor.wait_for("the cube", 60, |desktop| shows_cube(&desktop.screenshot()).then_some(()));
+    settled(&mut editor);
+    assert!(editor.log().contains("the view is shown at 1/"), "{}", editor.log());
+    assert!(editor.log().contains("of 96 MiB are in use"), "{}", editor.log());
+    editor.quit();
 }

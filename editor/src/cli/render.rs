@@ -93,7 +93,8 @@ pub(super) fn run(
         session.set_sample_offset(args.sample_offset)?;
     }
     let loaded_in = start.elapsed();
-    let run = accumulate(&mut session, args, &progress)?;
+    let run =
+        accumulate(&mut session, args, &progress).map_err(|error| session.advise_size(args.size, error))?;
     progress.finish_and_clear();
     let metadata = Metadata {
         samples: run.samples,
@@ -186,12 +187,18 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     let mut frames = Vec::new();
     let in_time = |samples: u64| samples == 0 || limit.is_none_or(|limit| start.elapsed() < limit);
     let mut done = 0;
+    let mut can_be_read = false;
     while (done < samples || session.textures_settle()) && in_time(done) {
         let recorder = session.begin_frame(args.size)?;
         session.submit(recorder, None)?;
         let times = &session.statistics().passes;
         if frames.len() < TIMED_FRAMES && !times.is_empty() {
             frames.push(times.clone());
+        }
+        // At the end, when hours may have passed, it would be too late to find out.
+        if !can_be_read && !session.textures_settle() {
+            session.check_read_back()?;
+            can_be_read = true;
         }
         done = session.samples();
         progress.set_position(done);

@@ -288,6 +288,7 @@ fn mono(text: String) -> RichText {
 /// On the left.
 fn status_words(cx: &mut Cx<'_>, ui: &mut Ui) {
     saved(cx, ui);
+    coarse_view(cx, ui);
     ui.separator();
     let statistics = cx.session.statistics();
     let reason = if statistics.reset_reason.is_empty() { "\u{2014}" } else { &statistics.reset_reason };
@@ -350,6 +351,17 @@ fn saved(cx: &Cx<'_>, ui: &mut Ui) {
         (icon::CHECK_CIRCLE, ui.visuals().weak_text_color(), "Everything is saved")
     };
     ui.label(RichText::new(format!("{mark}  {name}")).color(color).size(12.0)).on_hover_text(tip);
+}
+
+/// Says so when there is no memory for the whole view.
+fn coarse_view(cx: &Cx<'_>, ui: &mut Ui) {
+    let coarse = cx.session.least_divisor();
+    if coarse > 1 {
+        ui.separator();
+        let text = mono(format!("{} view at 1/{coarse}: memory is short", icon::WARNING));
+        let tip = format!("The view is shown at 1/{coarse} of its size, {}", cx.session.shortage());
+        ui.label(text.color(ui.visuals().warn_fg_color)).on_hover_text(tip);
+    }
 }
 
 fn memory(cx: &Cx<'_>, ui: &mut Ui) {

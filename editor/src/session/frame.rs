@@ -4,10 +4,11 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use caustica_renderer::Statistics;
 use caustica_renderer::gpu::{Acquired, Image, Recorder};
-use caustica_renderer::{RendererError, Statistics};
 use caustica_scene::{Document, NodeId, Target};
 
+use super::view_size::is_out_of_memory;
 use super::{HostTimes, Lap, Pick, Session, Tally};
 use crate::sync::{camera_of, instance_id};
 
@@ -24,7 +25,8 @@ impl Session {
     }
 
     /// Like [`Self::begin_frame`], with one pixel for `divisor` x `divisor` of the view, as while something moves on a slow device.
-    /// `divisor` is asked once it is known whether the view or what it shows has moved; `None`: as in the last frame.
+    /// `divisor` is asked once it is known whether the view or what it shows has moved; `None`: as in the last frame. Where
+    /// memory is short, textures give way, then the size of a view in a window ([`Self::least_divisor`]).
     ///
     /// # Errors
     /// As [`Self::begin_frame`].
@@ -33,13 +35,19 @@ impl Session {
         extent_px: [u32; 2],
         mut divisor: impl FnMut(bool) -> Option<u32>,
     ) -> anyhow::Result<Recorder> {
+        self.grow_back();
+        let mut has_let_go = false;
         loop {
             match self.try_frame(extent_px, &mut divisor) {
-                // What the scene needs comes before the detail of its textures.
-                Err(error) if is_out_of_memory(&error) && self.renderer.give_up_textures() => {
+                Ok(recorder) => {
+                    self.note_size();
+                    return Ok(recorder);
+                }
+                // What the scene needs comes before the detail of its textures, and of the view.
+                Err(error) if is_out_of_memory(&error) && self.make_room(&mut has_let_go) => {
                     self.resync = true
                 }
-                tried => return tried,
+                Err(error) => return Err(self.advise(error)),
             }
         }
     }
@@ -113,9 +121,8 @@ impl Session {
         let view = self.renderer.view_mut(self.view)?;
         view.resize(extent_px);
         view.set_camera(camera);
-        if let Some(divisor) = divisor(view.is_about_to_move()) {
-            view.set_divisor(divisor);
-        }
+        let wanted = divisor(view.is_about_to_move()).unwrap_or(view.divisor());
+        view.set_divisor(wanted.max(self.view_size.divisor));
         self.renderer.render(recorder, self.view)?;
         self.tally.note(self.renderer.statistics(self.view)?);
         self.host_times.render_ms = lap.ms();
@@ -236,10 +243,6 @@ impl Session {
     pub fn read_display(&mut self) -> anyhow::Result<Vec<[f32; 4]>> {
         Ok(self.renderer.read_display(&mut self.frames, self.view)?)
     }
-}
-
-fn is_out_of_memory(error: &anyhow::Error) -> bool {
-    error.downcast_ref::<RendererError>().is_some_and(RendererError::is_out_of_memory)
 }
 
 /// A sum of nothing is no time, and in Rust it is -0.

@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use caustica_renderer::delta::{self, SceneDelta};
-use caustica_scene::{ChangeSet, Document, MaterialId, MeshId, Target, TextureId};
+use caustica_scene::{ChangeSet, Document, MaterialId, Mesh, MeshId, Target, TextureId};
 
 use super::convert::{mesh_of, render_from, texture_of};
 use super::deform::Shape;
+use super::least_bytes::least_bytes;
 use super::material::material_of;
 
 /// Assets that one instance uses.
@@ -22,6 +23,8 @@ pub(super) struct InUse {
 #[derive(Debug, Default)]
 pub(super) struct Assets {
     meshes: BTreeMap<MeshId, MeshInUse>,
+    /// What all of them take at least.
+    mesh_bytes: u64,
     materials: BTreeMap<MaterialId, (usize, Vec<TextureId>)>,
     textures: BTreeMap<TextureId, usize>,
     touched: Touched,
@@ -31,6 +34,18 @@ pub(super) struct Assets {
 struct MeshInUse {
     users: BTreeSet<Target>,
     shape: Shape,
+    /// What it takes at least.
+    bytes: u64,
+}
+
+impl MeshInUse {
+    /// Takes in what a mesh is now; `sum` follows.
+    fn look_at(&mut self, mesh: Option<&Mesh>, sum: &mut u64) {
+        self.shape = mesh.map(Shape::of).unwrap_or_default();
+        let bytes = mesh.map_or(0, least_bytes);
+        *sum = sum.saturating_sub(self.bytes).saturating_add(bytes);
+        self.bytes = bytes;
+    }
 }
 
 /// Assets whose use has begun or ended since the last delta.
@@ -44,6 +59,16 @@ struct Touched {
 }
 
 impl Assets {
+    /// What all meshes in use take at least, bytes.
+    pub(super) fn mesh_bytes(&self) -> u64 {
+        self.mesh_bytes
+    }
+
+    /// The same of one.
+    pub(super) fn mesh_bytes_of(&self, mesh: MeshId) -> u64 {
+        self.meshes.get(&mesh).map_or(0, |known| known.bytes)
+    }
+
     /// Takes everything out.
     pub(super) fn clear(self, delta: &mut SceneDelta) {
         delta.removed_meshes.extend(self.meshes.keys().map(|id| delta::MeshId(id.0)));
@@ -62,12 +87,12 @@ impl Assets {
         let (old_mesh, new_mesh) = (old.map(|used| used.mesh), new.map(|used| used.mesh));
         if old_mesh != new_mesh {
             if let Some(id) = new_mesh {
-                let mesh = self.meshes.entry(id).or_default();
-                if mesh.users.is_empty() {
-                    mesh.shape = document.mesh(id).map(Shape::of).unwrap_or_default();
+                let known = self.meshes.entry(id).or_default();
+                if known.users.is_empty() {
+                    known.look_at(document.mesh(id), &mut self.mesh_bytes);
                     self.touched.new_meshes.insert(id);
                 }
-                mesh.users.insert(target);
+                known.users.insert(target);
             }
             if let Some((id, mesh)) = old_mesh.and_then(|id| Some((id, self.meshes.get_mut(&id)?))) {
                 mesh.users.remove(&target);
@@ -95,7 +120,7 @@ impl Assets {
         let mut users = Vec::new();
         for id in &changes.meshes {
             let (Some(known), Some(mesh)) = (self.meshes.get_mut(id), document.mesh(*id)) else { continue };
-            known.shape = Shape::of(mesh);
+            known.look_at(Some(mesh), &mut self.mesh_bytes);
             if known.shape.deforms() {
                 users.extend(&known.users);
             }
@@ -172,7 +197,8 @@ impl Assets {
     fn forget_unused(&mut self, touched: &Touched, delta: &mut SceneDelta) {
         for id in &touched.released_meshes {
             if self.meshes.get(id).is_some_and(|mesh| mesh.users.is_empty()) {
-                self.meshes.remove(id);
+                let forgotten = self.meshes.remove(id).map_or(0, |mesh| mesh.bytes);
+                self.mesh_bytes = self.mesh_bytes.saturating_sub(forgotten);
                 delta.removed_meshes.push(delta::MeshId(id.0));
             }
         }

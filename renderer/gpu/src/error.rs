@@ -31,6 +31,20 @@ pub enum GpuError {
         /// What the driver allows.
         budget_mib: f64,
     },
+    /// What is to be shown takes more memory than there is, whatever else is on the device.
+    #[error(
+        "out of device memory: {what} take at least {needed_mib:.1} MiB, and there are {budget_mib:.0}; {remedy}"
+    )]
+    NoRoom {
+        /// What it is, in the plural.
+        what: String,
+        /// What it takes.
+        needed_mib: f64,
+        /// What the driver or the user allows.
+        budget_mib: f64,
+        /// What would help.
+        remedy: String,
+    },
     /// The device no longer answers.
     #[error("the device was lost; the last pass that finished was '{last_pass}', then came '{next_pass}'")]
     DeviceLost {

@@ -53,6 +53,8 @@ pub struct MemoryBudget {
     pub budget_bytes: u64,
     /// Bytes that this program has taken. (What the driver says counts other programs too where the device is the processor.)
     pub used_bytes: u64,
+    /// The budget is a limit that was given at creation.
+    pub is_limit: bool,
 }
 
 /// Bytes in use by kind.
@@ -170,7 +172,7 @@ impl Device {
     /// Budget and use of the device-local heaps, or of the limit given at creation.
     pub fn memory_budget(&self) -> MemoryBudget {
         if let Some(limit) = self.memory.limit_bytes {
-            return MemoryBudget { budget_bytes: limit, used_bytes: self.memory.total() };
+            return MemoryBudget { budget_bytes: limit, used_bytes: self.memory.total(), is_limit: true };
         }
         let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
         let mut properties = vk::PhysicalDeviceMemoryProperties2::default();
@@ -187,6 +189,10 @@ impl Device {
         let known = self.has_memory_budget();
         let bytes =
             |heap: usize| if known { budget.heap_budget[heap] } else { heaps.memory_heaps[heap].size };
-        MemoryBudget { budget_bytes: local.map(bytes).sum(), used_bytes: self.memory.total() }
+        MemoryBudget {
+            budget_bytes: local.map(bytes).sum(),
+            used_bytes: self.memory.total(),
+            is_limit: false,
+        }
     }
 }

@@ -86,16 +86,16 @@ impl EditorWindow {
         }
         let config = &self.editor.state.config;
         let target_ms = config.adaptive.then_some(f64::from(config.target_frame_ms));
-        let view = &mut self.editor.state.view;
+        let view = &self.editor.state.view;
         let held = view.drag.is_some() || view.flying;
         let adaptive = &mut self.adaptive;
         let begun = self.editor.session.begin_frame_at(full, |moved| {
-            view.divisor = adaptive.next(Instant::now(), moved || held, full, target_ms);
-            Some(view.divisor)
+            Some(adaptive.next(Instant::now(), moved || held, full, target_ms))
         });
         match begun {
             Ok(recorder) => {
                 self.broken = None;
+                self.editor.state.view.divisor = self.editor.session.divisor();
                 self.shown = Some(key);
                 self.note_times();
                 Ok((recorder, true))
@@ -195,7 +195,10 @@ impl EditorWindow {
             return Ok(());
         };
         match self.editor.session.begin_frame(full) {
-            Ok(recorder) => self.editor.session.submit(recorder, None)?,
+            Ok(recorder) => {
+                self.editor.state.view.divisor = self.editor.session.divisor();
+                self.editor.session.submit(recorder, None)?;
+            }
             Err(error) if is_fatal(&error) => return Err(error),
             Err(error) => {
                 // The next whole frame meets the same error and shows it.
@@ -218,7 +221,7 @@ impl EditorWindow {
             self.broken.as_ref().map_or(repaint_delay, |broken| broken.delay().min(repaint_delay));
         let full = self.editor.state.view.extent_px;
         let fresh = full.is_some_and(|full| self.shown.as_ref() == Some(&self.key(full)));
-        let whole = self.editor.state.view.divisor == 1;
+        let whole = self.editor.state.view.divisor <= self.editor.session.least_divisor();
         let unfinished = full.is_some_and(|full| {
             let fails = self.broken.as_ref().is_some_and(|broken| broken.holds(&self.key(full)));
             let finished = fresh && whole && self.editor.session.is_done();

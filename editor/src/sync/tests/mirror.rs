@@ -9,7 +9,7 @@ use caustica_renderer::delta::{
 use caustica_scene::{ClipChoice, Document, Edit, Local, NodeId, Target, Trs};
 use glam::{DAffine3, DQuat, DVec3};
 
-use super::super::Sync;
+use super::super::{Sync, least_bytes};
 use super::rig::{BODY, BOX, JOINT, LAMP, Rig, STATUE, TWIN};
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -203,6 +203,9 @@ fn whatever_the_edits_the_renderer_holds_what_the_whole_scene_would_give_it() {
         let delta = rig.sync.delta(&mut rig.document, eye);
         mirror.apply(&delta);
         assert_eq!(mirror, Mirror::of(&rig.document, eye), "step {step}: {}", delta.reason);
+        let placed: BTreeSet<_> = rig.document.renderables().map(|placed| placed.mesh).collect();
+        let meshes = placed.iter().filter_map(|id| rig.document.mesh(*id));
+        assert_eq!(rig.sync.mesh_bytes(), meshes.map(least_bytes).sum::<u64>(), "step {step}");
     }
     assert!(refused < 600, "most edits fit: {refused} were refused");
 }

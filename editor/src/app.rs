@@ -20,6 +20,7 @@ pub mod editor;
 mod export;
 mod files;
 mod recovery;
+mod shaders;
 mod window;
 
 /// What the command line says.

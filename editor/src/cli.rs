@@ -146,7 +146,7 @@ pub fn run() -> ExitCode {
             None => crate::app::run(crate::app::AppOptions {
                 file: cli.file.or_else(demo_project),
                 device: cli.device.device.clone(),
-                shaders: cli.shaders,
+                shaders: cli.shaders.or_else(shader_folder),
                 validation: cli.device.validation,
                 memory_limit_bytes: cli.device.memory_limit_bytes(),
             })
@@ -164,6 +164,12 @@ fn demo_project() -> Option<PathBuf> {
     const DEMO: &str = "projects/gallery/gallery.caustica.json";
     let folders = [PathBuf::from("."), PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))];
     folders.into_iter().map(|folder| folder.join(DEMO)).find(|file| file.is_file())
+}
+
+/// The folder of the shaders, where the program is started from its checkout or was built in one that is still there.
+fn shader_folder() -> Option<PathBuf> {
+    let folders = [PathBuf::from("."), PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))];
+    folders.into_iter().map(|folder| folder.join("shaders")).find(|folder| folder.join("passes").is_dir())
 }
 
 /// The scene of a file, with what was left out or repaired on reading.

@@ -11,6 +11,7 @@ use crate::ui_state::UiState;
 
 pub mod acceleration;
 pub mod bars;
+mod code;
 pub mod environment;
 pub mod inspector;
 pub mod material;
@@ -21,6 +22,7 @@ pub mod outliner;
 pub mod overlays;
 pub mod render;
 pub mod reports;
+pub mod shaders;
 pub mod shapes;
 pub mod source;
 pub mod timeline;

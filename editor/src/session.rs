@@ -10,14 +10,15 @@ mod room;
 mod tally;
 mod view_size;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use caustica_renderer::delta::LightId;
 use caustica_renderer::gpu::{Device, Frames};
+use caustica_renderer::shader::{ShaderStatus, Wake};
 use caustica_renderer::{
-    AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings,
+    AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings, WakeFn,
 };
 use caustica_scene::{Document, Edit, EditError, Local, NodeId, PrefabId, Recovered, ShapeSource, Target};
 use glam::DVec3;
@@ -41,6 +42,8 @@ const SUBMIT_BUDGET_MS: f64 = 30.0;
 pub struct SessionOptions {
     /// Read shaders from this folder instead of the copy in the binary.
     pub shaders: Option<PathBuf>,
+    /// Shaders of that folder are edited; this is called when there is something new to see.
+    pub watch_shaders: Option<WakeFn>,
     /// Settings of the view.
     pub settings: ViewSettings,
     /// Size of the view in pixels.
@@ -105,6 +108,7 @@ impl Session {
             options.acceleration.unwrap_or_else(|| AccelPolicy::of(&profile.profile, options.window));
         let renderer_options = RendererOptions {
             shaders: options.shaders,
+            watch_shaders: options.watch_shaders,
             acceleration,
             primary_rays_pay: profile.profile.primary_rays_pay(),
         };
@@ -129,6 +133,31 @@ impl Session {
             host_times: HostTimes::default(),
             device: Arc::clone(device),
         })
+    }
+
+    /// How it stands with shaders that are edited.
+    pub fn shader_status(&self) -> ShaderStatus {
+        self.renderer.shader_status()
+    }
+
+    /// Where shaders are edited; `None`: they are those of the binary.
+    pub fn shader_folder(&self) -> Option<PathBuf> {
+        self.renderer.shader_folder()
+    }
+
+    /// The shader files that the picture is made of: main files with what they include.
+    pub fn shader_files(&self) -> BTreeMap<String, Vec<String>> {
+        self.renderer.shader_files()
+    }
+
+    /// Takes shaders from a folder and follows what is saved there. `wake` is called, on another thread, when there is something new.
+    pub fn edit_shaders(&mut self, folder: &Path, wake: Wake) {
+        self.renderer.edit_shaders(folder, wake);
+    }
+
+    /// Takes over shaders that were edited, as the next frame would. True: the picture begins anew.
+    pub fn take_over_shaders(&mut self) -> bool {
+        self.renderer.take_over_shaders()
     }
 
     /// The device.

@@ -15,11 +15,13 @@ mod config;
 mod euler;
 mod rows;
 mod selection;
+mod shader_texts;
 
 pub use config::{Config, Tab, add_tab, default_layout};
 pub use euler::EulerFields;
 pub use rows::{OutlinerState, Row};
 pub use selection::{SelectedPrimitive, Selection};
+pub use shader_texts::{ShaderTexts, write_built_in};
 
 /// How bad a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -217,6 +219,8 @@ pub struct UiState {
     pub actions: Vec<Action>,
     /// What is kept between runs.
     pub config: Config,
+    /// Texts of shaders that are open.
+    pub shaders: ShaderTexts,
     /// The log.
     pub log: LogBuffer,
     /// The latest audit.

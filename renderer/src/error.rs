@@ -2,6 +2,8 @@
 
 use caustica_gpu::GpuError;
 
+use crate::shader::{ShaderFault, listed};
+
 /// What can go wrong between a scene and an image.
 #[derive(Debug, thiserror::Error)]
 pub enum RendererError {
@@ -9,12 +11,12 @@ pub enum RendererError {
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// A shader does not compile; the message holds one line an error, each with file:line.
-    #[error("{file} does not compile:\n{log}")]
+    #[error("{file} does not compile:\n{}", listed(faults))]
     Compile {
         /// Main file of the stage, relative to the shader folder.
         file: String,
-        /// Messages of the compiler.
-        log: String,
+        /// What the compiler says.
+        faults: Vec<ShaderFault>,
     },
     /// A shader file is missing or unreadable.
     #[error("{file}: {reason}")]

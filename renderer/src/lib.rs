@@ -29,7 +29,7 @@ pub use measure::{
     ProfileInForce, Statistics, TlasTimes, TlasWork,
 };
 pub use needs::{Needs, SceneSummary, SurfaceSummary};
-pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions};
+pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions, WakeFn};
 pub use sampling::Sampling;
 pub use settings::{
     NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, ShadowRate, Show, ToneMap, ViewSettings,

@@ -20,8 +20,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use caustica_gpu::{
-    Bind, ComputePipeline, Device, HitGroup, RayTracingDesc, RayTracingPipeline, Recorder, SceneSet,
-    Specialization, Stage, Use,
+    Bind, ColorTarget, ComputePipeline, Device, Format, GraphicsDesc, GraphicsPipeline, HitGroup,
+    RayTracingDesc, RayTracingPipeline, Recorder, SceneLayout, SceneSet, Specialization, Stage, Use,
 };
 
 pub(crate) use accumulate::Accumulate;
@@ -44,86 +44,165 @@ use crate::error::Result;
 use crate::gpu_types::Push;
 use crate::needs::Needs;
 use crate::settings::Show;
-use crate::shader::{Compiled, ShaderLibrary, merge_interfaces};
+use crate::shader::{Compiled, Live, Owner, ShaderLibrary, StageOf, check_payloads, merge_interfaces};
 use crate::tables::Tables;
 
 /// Builds pipelines for one set of needs.
 pub(crate) struct Builder<'a> {
     pub(crate) device: &'a Arc<Device>,
-    pub(crate) library: &'a mut ShaderLibrary,
-    pub(crate) set: &'a SceneSet,
+    pub(crate) library: &'a ShaderLibrary,
+    pub(crate) layout: &'a Arc<SceneLayout>,
     pub(crate) needs: Needs,
     pub(crate) specialization: Specialization,
+    pub(crate) owner: Arc<Owner>,
+}
+
+/// What a pipeline is made with, again whenever its shaders change.
+#[derive(Clone)]
+struct Frame {
+    label: &'static str,
+    device: Arc<Device>,
+    layout: Option<Arc<SceneLayout>>,
+    specialization: Specialization,
+}
+
+impl Frame {
+    fn scene(&self) -> Option<&SceneLayout> {
+        self.layout.as_deref()
+    }
 }
 
 impl Builder<'_> {
-    fn compute(&mut self, label: &str, file: &str) -> Result<ComputePipeline> {
-        let stage = self.library.stage(file)?;
-        let set = Some(self.set);
-        Ok(ComputePipeline::new(
-            self.device,
-            label,
-            &stage.module,
-            &stage.interface,
-            &self.specialization,
-            set,
-        )?)
+    fn frame(&self, label: &'static str) -> Frame {
+        let (device, layout) = (Arc::clone(self.device), Some(Arc::clone(self.layout)));
+        Frame { label, device, layout, specialization: self.specialization.clone() }
+    }
+
+    fn compute(&self, label: &'static str, file: &'static str) -> Result<Live<ComputePipeline>> {
+        compute(self.library, &self.owner, self.frame(label), file)
+    }
+
+    fn raster(
+        &self,
+        label: &'static str,
+        vertex_file: &'static str,
+        fragment_file: &'static str,
+    ) -> Result<Live<GraphicsPipeline>> {
+        let frame = self.frame(label);
+        let make = move |stage: StageOf<'_>| {
+            let (vertex, fragment) = (stage(vertex_file)?, stage(fragment_file)?);
+            let interface = merge_interfaces(&[&vertex, &fragment])?;
+            let desc = GraphicsDesc {
+                name: frame.label,
+                vertex: &vertex.module,
+                fragment: &fragment.module,
+                colors: &[ColorTarget { format: Format::Rgba32Uint }],
+                depth: Some(Format::Depth32),
+            };
+            Ok(GraphicsPipeline::new(&frame.device, &desc, &interface, &frame.specialization, frame.scene())?)
+        };
+        self.library.live(&[vertex_file, fragment_file], &self.owner, Box::new(make))
     }
 
     /// A ray-tracing pipeline around one ray generation shader; the other stages are the same for all.
-    fn rays(&mut self, label: &str, file: &str) -> Result<RayTracingPipeline> {
-        let generation = self.library.stage(file)?;
-        let surface_miss = self.library.stage("passes/rays/surface.rmiss")?;
-        let shadow_miss = self.library.stage("passes/rays/shadow.rmiss")?;
-        let surface_hit = self.library.stage("passes/rays/surface.rchit")?;
-        let surface_any = self.optional(self.needs.any_hit, "passes/rays/surface.rahit")?;
-        let shadow_any = self.optional(self.needs.any_hit, "passes/rays/shadow.rahit")?;
-        let shape_hit = self.optional(self.needs.shapes, "passes/rays/shape.rchit")?;
-        let shape_intersection = self.optional(self.needs.shapes, "passes/rays/shape.rint")?;
-        let mut stages = vec![&*generation, &*surface_miss, &*shadow_miss, &*surface_hit];
-        for stage in [&surface_any, &shadow_any, &shape_hit, &shape_intersection] {
-            stages.extend(stage.as_deref());
-        }
-        let interface = merge_interfaces(&stages)?;
-        let [surface_any, shadow_any, shape_hit, shape_intersection] =
-            [&surface_any, &shadow_any, &shape_hit, &shape_intersection]
-                .map(|stage| stage.as_deref().map(|stage| &stage.module));
-        // In the order of RAY_SURFACE and RAY_SHADOW; then the same for shapes (RAY_SHAPES).
-        let of_kind = |closest_hit, intersection| {
-            [(closest_hit, surface_any), (None, shadow_any)].map(|(closest_hit, any_hit)| HitGroup {
-                closest_hit,
-                any_hit,
-                intersection,
-            })
-        };
-        let mut hit_groups = of_kind(Some(&surface_hit.module), None).to_vec();
-        if shape_intersection.is_some() {
-            hit_groups.extend(of_kind(shape_hit, shape_intersection));
-        }
-        let desc = RayTracingDesc {
-            name: label,
-            ray_generation: &generation.module,
-            misses: &[&surface_miss.module, &shadow_miss.module],
-            hit_groups: &hit_groups,
-        };
-        Ok(RayTracingPipeline::new(self.device, &desc, &interface, &self.specialization, Some(self.set))?)
+    fn rays(&self, label: &'static str, generation: &'static str) -> Result<Live<RayTracingPipeline>> {
+        let frame = self.frame(label);
+        let files = RayFiles::of(generation, self.needs);
+        let make = move |stage: StageOf<'_>| ray_pipeline(&frame, &files, stage);
+        self.library.live(&files.all(), &self.owner, Box::new(make))
+    }
+}
+
+fn compute(
+    library: &ShaderLibrary,
+    owner: &Arc<Owner>,
+    frame: Frame,
+    file: &'static str,
+) -> Result<Live<ComputePipeline>> {
+    let make = move |stage: StageOf<'_>| {
+        let stage = stage(file)?;
+        let Frame { label, device, specialization, .. } = &frame;
+        let (module, interface) = (&stage.module, &stage.interface);
+        Ok(ComputePipeline::new(device, label, module, interface, specialization, frame.scene())?)
+    };
+    library.live(&[file], owner, Box::new(make))
+}
+
+/// The stages of a ray-tracing pipeline.
+#[derive(Clone, Copy)]
+struct RayFiles {
+    generation: &'static str,
+    any_hit: Option<[&'static str; 2]>,
+    /// Closest hit and intersection.
+    shapes: Option<[&'static str; 2]>,
+}
+
+/// Miss shaders of the kinds of rays, in the order of RAY_SURFACE and RAY_SHADOW.
+const MISSES: [&str; 2] = ["passes/rays/surface.rmiss", "passes/rays/shadow.rmiss"];
+const CLOSEST_HIT: &str = "passes/rays/surface.rchit";
+
+impl RayFiles {
+    fn of(generation: &'static str, needs: Needs) -> Self {
+        let any_hit = ["passes/rays/surface.rahit", "passes/rays/shadow.rahit"];
+        let shapes = ["passes/rays/shape.rchit", "passes/rays/shape.rint"];
+        Self { generation, any_hit: needs.any_hit.then_some(any_hit), shapes: needs.shapes.then_some(shapes) }
     }
 
-    fn optional(&mut self, wanted: bool, file: &str) -> Result<Option<Arc<Compiled>>> {
-        wanted.then(|| self.library.stage(file)).transpose()
+    fn all(&self) -> Vec<&'static str> {
+        let optional = self.any_hit.into_iter().chain(self.shapes).flatten();
+        [self.generation].into_iter().chain(MISSES).chain([CLOSEST_HIT]).chain(optional).collect()
     }
+}
+
+fn ray_pipeline(frame: &Frame, files: &RayFiles, stage: StageOf<'_>) -> Result<RayTracingPipeline> {
+    let pair = |files: [&str; 2]| -> Result<[Arc<Compiled>; 2]> { Ok([stage(files[0])?, stage(files[1])?]) };
+    let generation = stage(files.generation)?;
+    let (misses, closest_hit) = (pair(MISSES)?, stage(CLOSEST_HIT)?);
+    let (any_hit, shapes) = (files.any_hit.map(pair).transpose()?, files.shapes.map(pair).transpose()?);
+    let mut others = vec![&*misses[0], &*misses[1], &*closest_hit];
+    others.extend(any_hit.iter().chain(&shapes).flatten().map(|stage| &**stage));
+    check_payloads(&generation, &others)?;
+    let interface = merge_interfaces(&[&[&*generation], &others[..]].concat())?;
+    let module =
+        |pair: &Option<[Arc<Compiled>; 2]>, at: usize| pair.as_ref().map(|pair| Arc::clone(&pair[at]));
+    let any_hits = [module(&any_hit, 0), module(&any_hit, 1)];
+    let (shape_hit, intersection) = (module(&shapes, 0), module(&shapes, 1));
+    // In the order of RAY_SURFACE and RAY_SHADOW; then the same for shapes (RAY_SHAPES).
+    let mut hit_groups = Vec::new();
+    for (closest, intersection) in [(Some(&closest_hit), None), (shape_hit.as_ref(), intersection.as_ref())] {
+        if hit_groups.is_empty() || intersection.is_some() {
+            hit_groups.extend([closest, None].into_iter().zip(&any_hits).map(|(closest, any_hit)| {
+                HitGroup {
+                    closest_hit: closest.map(|stage| &stage.module),
+                    any_hit: any_hit.as_ref().map(|stage| &stage.module),
+                    intersection: intersection.map(|stage| &stage.module),
+                }
+            }));
+        }
+    }
+    let desc = RayTracingDesc {
+        name: frame.label,
+        ray_generation: &generation.module,
+        misses: &[&misses[0].module, &misses[1].module],
+        hit_groups: &hit_groups,
+    };
+    Ok(RayTracingPipeline::new(&frame.device, &desc, &interface, &frame.specialization, frame.scene())?)
 }
 
 /// Builds a pass that works on tables alone: no scene set, no needs.
 fn table_pass(
     device: &Arc<Device>,
-    library: &mut ShaderLibrary,
-    label: &str,
-    file: &str,
-) -> Result<ComputePipeline> {
-    let stage = library.stage(file)?;
-    let general = Specialization::default();
-    Ok(ComputePipeline::new(device, label, &stage.module, &stage.interface, &general, None)?)
+    library: &ShaderLibrary,
+    label: &'static str,
+    file: &'static str,
+) -> Result<Live<ComputePipeline>> {
+    let owner = Arc::new(Owner::of_tables());
+    let device = Arc::clone(device);
+    let frame = Frame { label, device, layout: None, specialization: Specialization::default() };
+    let live = compute(library, &owner, frame, file)?;
+    // Nothing is bound beside the tables: known before the first frame that needs the pass.
+    live.get(&[]);
+    Ok(live)
 }
 
 /// Groups of 64 that go through `count` entries of a table; the shader takes several steps where they are too few.
@@ -154,19 +233,20 @@ impl Scope<'_> {
         &self,
         recorder: &mut Recorder,
         label: &str,
-        pipeline: &ComputePipeline,
+        pipeline: &Live<ComputePipeline>,
         binds: &[(&str, Bind<'_>)],
         uses: &[Use<'_>],
         argument0: u32,
     ) -> Result<()> {
         let mut all = uses.to_vec();
+        let pipeline = pipeline.get(binds);
         if pipeline.interface().uses_scene {
             all.extend(self.tables.uses(Stage::Compute));
         }
         let groups = [self.extent[0].div_ceil(8), self.extent[1].div_ceil(8), 1];
         let push = self.push(argument0, 0);
         recorder.pass(label, |recorder| {
-            recorder.dispatch(pipeline, Some(self.set), binds, &all, bytemuck::bytes_of(&push), groups)
+            recorder.dispatch(&pipeline, Some(self.set), binds, &all, bytemuck::bytes_of(&push), groups)
         })?;
         Ok(())
     }
@@ -181,18 +261,19 @@ impl Scope<'_> {
         &self,
         recorder: &mut Recorder,
         label: &str,
-        pipeline: &RayTracingPipeline,
+        pipeline: &Live<RayTracingPipeline>,
         binds: &[(&str, Bind<'_>)],
         uses: &[Use<'_>],
         argument0: u32,
     ) -> Result<()> {
         let mut all = uses.to_vec();
+        let pipeline = pipeline.get(binds);
         all.extend(self.tables.uses(Stage::RayTracing));
         all.extend(self.accel.uses());
         let push = self.push(argument0, self.rows.start);
         let size = [self.extent[0], self.rows.end - self.rows.start];
         recorder.pass(label, |recorder| {
-            recorder.trace_rays(pipeline, Some(self.set), binds, &all, bytemuck::bytes_of(&push), size)
+            recorder.trace_rays(&pipeline, Some(self.set), binds, &all, bytemuck::bytes_of(&push), size)
         })?;
         Ok(())
     }
@@ -207,7 +288,7 @@ pub(crate) struct ScenePasses {
 }
 
 impl ScenePasses {
-    pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
         Ok(Self {
             blas_surface: BlasSurface::new(device, library)?,
             deform: Deform::new(device, library)?,
@@ -243,10 +324,12 @@ pub(crate) struct PassSet {
     /// Made when it is shown for the first time.
     pub(crate) light_shadow: Option<LightShadow>,
     pub(crate) post: Post,
+    /// Of all its pipelines.
+    pub(crate) owner: Arc<Owner>,
 }
 
 impl PassSet {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         Ok(Self {
             gbuffer: GBuffer::new(builder)?,
             radiance: if builder.needs.paths {
@@ -257,11 +340,12 @@ impl PassSet {
             accumulate: Accumulate::new(builder)?,
             light_shadow: None,
             post: Post::new(builder)?,
+            owner: Arc::clone(&builder.owner),
         })
     }
 
     /// Makes what a view asks for and was not asked for before.
-    pub(crate) fn prepare(&mut self, builder: &mut Builder<'_>, show: Show, window: bool) -> Result<()> {
+    pub(crate) fn prepare(&mut self, builder: &Builder<'_>, show: Show, window: bool) -> Result<()> {
         if show == Show::Shadow && builder.needs.shadow_rays && self.light_shadow.is_none() {
             self.light_shadow = Some(LightShadow::new(builder)?);
         }

@@ -2,7 +2,7 @@
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse, Recorder};
@@ -19,7 +19,7 @@ use crate::needs::Needs;
 use crate::passes::{Builder, PassSet, ScenePasses};
 use crate::sampling::Sampling;
 use crate::settings::{Pipeline, Primary, ViewSettings};
-use crate::shader::{ShaderLibrary, ShaderSources, SpirvCache};
+use crate::shader::{Reloader, ShaderLibrary, ShaderSources, ShaderStatus, SpirvCache, TakenOver, Wake};
 use crate::summary::Summary;
 use crate::tables::{Changed, Tables, changes_image};
 use crate::view::{CameraMatrices, View, ViewId};
@@ -29,10 +29,23 @@ use crate::view::{CameraMatrices, View, ViewId};
 pub struct RendererOptions {
     /// Read shaders from this folder instead of the copy in the binary.
     pub shaders: Option<PathBuf>,
+    /// Shaders of that folder are edited: pipelines are made anew when a file changes, and this is called, on another thread, when
+    /// the next frame will show it.
+    pub watch_shaders: Option<WakeFn>,
     /// When acceleration structures are built, refitted and compacted.
     pub acceleration: AccelPolicy,
     /// Rays find the first surfaces faster than the rasteriser does: what [`Primary::Auto`] means.
     pub primary_rays_pay: bool,
+}
+
+/// See [`RendererOptions::watch_shaders`].
+#[derive(Clone)]
+pub struct WakeFn(pub Wake);
+
+impl std::fmt::Debug for WakeFn {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("WakeFn")
+    }
 }
 
 /// What is seen through a pixel.
@@ -60,7 +73,8 @@ pub struct Accumulated {
 /// Scene, views and pipelines on one device.
 pub struct Renderer {
     device: Arc<Device>,
-    library: ShaderLibrary,
+    library: Arc<ShaderLibrary>,
+    reloader: Option<Reloader>,
     tables: Tables,
     accel: Accel,
     primary_rays_pay: bool,
@@ -85,12 +99,16 @@ impl Renderer {
         let tables = Tables::new(device, &mut recorder)?;
         frames.submit(recorder, None)?;
         let sources = ShaderSources::new(options.shaders.clone());
-        let mut library = ShaderLibrary::new(device, sources, SpirvCache::of_user());
+        let edited = options.watch_shaders.is_some();
+        let library = Arc::new(ShaderLibrary::new(device, sources, SpirvCache::of_user(), edited));
+        let wake = options.watch_shaders.clone();
+        let reloader = wake.and_then(|WakeFn(wake)| Reloader::new(&library, wake));
         let kind = MemoryUse::Staging;
         Ok(Self {
             device: Arc::clone(device),
-            scene_passes: ScenePasses::new(device, &mut library)?,
+            scene_passes: ScenePasses::new(device, &library)?,
             library,
+            reloader,
             tables,
             accel: Accel::new(device, options.acceleration)?,
             primary_rays_pay: options.primary_rays_pay,
@@ -111,6 +129,7 @@ impl Renderer {
     /// When the delta names what is not there, or memory runs out.
     pub fn apply(&mut self, recorder: &mut Recorder, delta: &SceneDelta) -> Result<()> {
         self.tables.settle();
+        self.take_over_shaders();
         if !delta.is_empty() {
             let shows = changes_image(delta, &self.tables);
             let applied = self.tables.apply(recorder, delta, &mut self.changed);
@@ -151,6 +170,45 @@ impl Renderer {
         environment.update_set(slot, textures.set_of(slot));
         self.accel.update_set(slot, self.tables.textures.set_of(slot));
         Ok(())
+    }
+
+    /// Takes over pipelines that were made anew; [`Self::apply`] does it too. True: views begin anew.
+    pub fn take_over_shaders(&mut self) -> bool {
+        let Some(TakenOver { files, fills_tables }) = self.reloader.as_mut().and_then(Reloader::take_over)
+        else {
+            return false;
+        };
+        self.passes.retain(|_, passes| !passes.owner.is_outdated());
+        self.changed.all |= fills_tables;
+        self.invalidate(Invalidation::Everything, &format!("shader {}", files.join(", ")));
+        true
+    }
+
+    /// Whether [`Self::take_over_shaders`] has something to take over, or to tell of.
+    pub fn shaders_wait(&self) -> bool {
+        self.reloader.as_ref().is_some_and(Reloader::is_waiting)
+    }
+
+    /// Where shaders are edited.
+    pub fn shader_folder(&self) -> Option<PathBuf> {
+        self.reloader.as_ref().and_then(|_| self.library.folder())
+    }
+
+    /// Takes shaders from a folder from now on and makes pipelines anew when a file in it changes; see
+    /// [`RendererOptions::watch_shaders`].
+    pub fn edit_shaders(&mut self, folder: &Path, wake: Wake) {
+        self.library.edit(folder);
+        self.reloader = Reloader::new(&self.library, wake);
+    }
+
+    /// The shader files that pipelines were made of so far: main files with what they include.
+    pub fn shader_files(&self) -> BTreeMap<String, Vec<String>> {
+        self.library.files()
+    }
+
+    /// How it stands with shaders that are edited.
+    pub fn shader_status(&self) -> ShaderStatus {
+        self.reloader.as_ref().map(Reloader::status).unwrap_or_default()
     }
 
     fn invalidate(&mut self, what: Invalidation, reason: &str) {
@@ -293,18 +351,21 @@ impl Renderer {
         let (_, needs, sampling) = key;
         let mut specialization = needs.specialization();
         specialization.values.extend(sampling.specialization().values);
-        let mut builder = Builder {
+        let owner = self.passes.get(&key).map(|passes| Arc::clone(&passes.owner)).unwrap_or_default();
+        owner.set_used(self.device.recording());
+        let builder = Builder {
             device: &self.device,
-            library: &mut self.library,
-            set: self.tables.textures.set_of(frame_slot),
+            library: &self.library,
+            layout: self.tables.textures.set_of(frame_slot).layout(),
             needs,
             specialization,
+            owner,
         };
         let passes = match self.passes.entry(key) {
             Entry::Occupied(entry) => entry.into_mut(),
-            Entry::Vacant(entry) => entry.insert(PassSet::new(&mut builder)?),
+            Entry::Vacant(entry) => entry.insert(PassSet::new(&builder)?),
         };
-        passes.prepare(&mut builder, show, window)
+        passes.prepare(&builder, show, window)
     }
 
     /// Bytes that [`Self::read_back`] takes for a while.

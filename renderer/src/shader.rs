@@ -1,13 +1,26 @@
-//! Shaders: sources and their includes, compilation with a cache, reflection, modules ready for pipelines.
-//! Enters: GLSL files, embedded in the binary or from a folder. Leaves: modules and interfaces.
+//! Shaders: sources and their includes, compilation with a cache, reflection, and pipelines that are made anew when a file changes.
+//! Enters: GLSL files, embedded in the binary or from a folder. Leaves: stages, pipelines, and what is wrong with a file.
 
 mod compile;
+mod fault;
 mod library;
+mod live;
+mod payloads;
 mod reflect;
+mod reload;
 mod sources;
 mod twins;
+mod watch;
 
 pub use compile::{SpirvCache, compile};
+pub use fault::ShaderFault;
 pub use library::{Compiled, ShaderLibrary, merge_interfaces};
 pub use reflect::{Reflection, reflect};
+pub use reload::{Reload, ShaderStatus, Wake};
 pub use sources::{ShaderSources, Source};
+pub use watch::Watching;
+
+pub(crate) use fault::listed;
+pub(crate) use live::{Live, Owner, StageOf};
+pub(crate) use payloads::check_payloads;
+pub(crate) use reload::{Reloader, TakenOver};

@@ -92,7 +92,7 @@ pub fn run(session: &mut Session, snippet: &Snippet<'_>) -> Vec<f32> {
         &module,
         &interface,
         &snippet.specialization,
-        set.as_ref(),
+        set.as_ref().map(|set| &**set.layout()),
     )
     .expect("a pipeline");
     for (target, data) in inputs.iter().zip(snippet.inputs) {

@@ -1,8 +1,11 @@
 //! A renderer with one view. Enters: a delta, a camera, settings. Leaves: mean radiance, the display image, figures.
 
+use std::path::Path;
+use std::sync::Arc;
+
 use caustica_renderer::delta::{Camera, SceneDelta};
 use caustica_renderer::{
-    AccelPolicy, Accumulated, Renderer, RendererOptions, Statistics, View, ViewId, ViewSettings,
+    AccelPolicy, Accumulated, Renderer, RendererOptions, Statistics, View, ViewId, ViewSettings, WakeFn,
 };
 
 use crate::gpu::{Session, session, session_within};
@@ -60,8 +63,18 @@ impl Studio {
         Self::make(session_within(memory_limit_bytes), extent, settings, false, AccelPolicy::default())
     }
 
+    /// A studio whose shaders are those of a folder and are edited while it runs.
+    ///
+    /// # Panics
+    /// When the device cannot.
+    pub fn editing(folder: &Path, extent: [u32; 2], settings: ViewSettings) -> Self {
+        let (shaders, watch_shaders) = (Some(folder.to_owned()), Some(WakeFn(Arc::new(|| ()))));
+        let options = RendererOptions { shaders, watch_shaders, ..RendererOptions::default() };
+        Self::with_options(session(), extent, settings, false, &options)
+    }
+
     fn make(
-        mut session: Session,
+        session: Session,
         extent: [u32; 2],
         settings: ViewSettings,
         window: bool,
@@ -69,7 +82,17 @@ impl Studio {
     ) -> Self {
         let options =
             RendererOptions { shaders: shaders_under_test(), acceleration, ..RendererOptions::default() };
-        let mut renderer = Renderer::new(&session.device, &mut session.frames, &options).expect("a renderer");
+        Self::with_options(session, extent, settings, window, &options)
+    }
+
+    fn with_options(
+        mut session: Session,
+        extent: [u32; 2],
+        settings: ViewSettings,
+        window: bool,
+        options: &RendererOptions,
+    ) -> Self {
+        let mut renderer = Renderer::new(&session.device, &mut session.frames, options).expect("a renderer");
         let view = renderer.create_view(extent, settings, window).expect("a view");
         Self { renderer, view, session }
     }

@@ -11,7 +11,7 @@ use caustica_gpu::{
     MemoryUse, RayTracingDesc, RayTracingPipeline, ResourceId, Specialization, Stage, TlasInstances,
     TriangleGeometry, Use, pack_instance,
 };
-use caustica_renderer::shader::{Compiled, Source, SpirvCache, compile, merge_interfaces, reflect};
+use caustica_renderer::shader::{Compiled, Source, SpirvCache, merge_interfaces};
 use caustica_tests::gpu::{Session, session};
 
 /// Rays along each side of the unit square.
@@ -58,11 +58,8 @@ void main() {
 
 fn stage(device: &Arc<Device>, file: &str, body: &str) -> Compiled {
     let texts = BTreeMap::from([(file.to_owned(), format!("#version 460\n{PUSH}{body}"))]);
-    let words =
-        compile(&Source { file: file.to_owned(), texts }, &SpirvCache::of_user()).expect("it compiles");
-    let interface = reflect(file, &words).expect("its interface fits").interface;
-    let module = caustica_gpu::ShaderModule::new(device, file, &words).expect("a module");
-    Compiled { module, interface, file: file.to_owned() }
+    let source = Source { file: file.to_owned(), texts };
+    Compiled::new(device, source, &SpirvCache::of_user()).expect("it compiles and fits")
 }
 
 /// A device with what all tests here do on it.

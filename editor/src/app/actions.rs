@@ -139,6 +139,10 @@ pub enum Action {
     ToggleLoop,
     /// Show the scene without any clip.
     RestPose,
+    /// Save the shader that is being edited.
+    SaveShader,
+    /// Write the shaders into the user's folder, to edit them there.
+    EditShaders,
     /// Open the command palette.
     Palette,
     /// Open a window of the Help menu.

@@ -33,7 +33,10 @@ impl Editor {
             Action::SaveAs => self.ask(Wish::SaveAs),
             Action::Export => self.ask(Wish::Export),
             Action::Recover => self.guarded(Then::Recover),
+            Action::Quit if !self.shaders_are_saved() => {}
             Action::Quit => self.guarded(Then::Quit),
+            Action::SaveShader => self.save_shader(),
+            Action::EditShaders => self.edit_shaders(),
             Action::Undo | Action::Redo => self.undo_or_redo(action == Action::Undo),
             Action::Duplicate => self.duplicate(),
             Action::Delete => self.delete(),

@@ -224,7 +224,11 @@ impl Editor {
                 self.state.palette = Some(PaletteState { text, ..PaletteState::default() });
                 return;
             }
-            self.state.actions.extend(pressed);
+            // While a shader is typed in, it is what is saved.
+            let has_focus = self.state.shaders.has_focus;
+            let of_shader =
+                |action| if has_focus && action == Action::Save { Action::SaveShader } else { action };
+            self.state.actions.extend(pressed.into_iter().map(of_shader));
         }
     }
 
@@ -398,6 +402,7 @@ impl TabViewer for Tabs<'_> {
             Tab::Animation => panels::timeline::ui(&mut self.cx, ui),
             Tab::LeftOut => panels::reports::left_out(&mut self.cx, ui),
             Tab::Health => panels::reports::health(&mut self.cx, ui),
+            Tab::Shaders => panels::shaders::ui(&mut self.cx, ui),
             Tab::Log => panels::reports::log(&mut self.cx, ui),
         }
     }

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use caustica_renderer::ViewSettings;
 use caustica_renderer::gpu::{Device, DeviceOptions, Instance, InstanceOptions, Requirements, Swapchain};
+use caustica_renderer::{ViewSettings, WakeFn};
 use egui::ViewportId;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::dpi::LogicalSize;
@@ -150,6 +150,7 @@ impl EditorWindow {
             &device,
             SessionOptions {
                 shaders: options.shaders.clone(),
+                watch_shaders: Some(WakeFn(Arc::clone(&wake))),
                 extent: [size.width.max(8), size.height.max(8)],
                 window: true,
                 ..SessionOptions::default()

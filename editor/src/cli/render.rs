@@ -6,11 +6,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use caustica_renderer::ViewSettings;
 use caustica_renderer::delta::LightId;
+use caustica_renderer::{ViewSettings, WakeFn};
 use caustica_scene::Edit;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -49,6 +51,17 @@ pub(super) fn run(
     shaders: Option<PathBuf>,
 ) -> anyhow::Result<ExitCode> {
     let kind = output::kind_of(&args.output)?;
+    let shaders = shaders.or_else(|| args.watch.then(super::shader_folder).flatten());
+    if args.watch && shaders.is_none() {
+        bail!("--watch: there is no folder of shaders here; name one with --shaders DIR");
+    }
+    let (wake, woken) = channel();
+    let watch_shaders = args.watch.then(|| {
+        WakeFn(Arc::new(move || {
+            // Nobody needs waking once the last picture was written.
+            let _ = wake.send(());
+        }))
+    });
     let start = Instant::now();
     let progress = progress_bar(args);
     progress.set_message("loading");
@@ -58,8 +71,10 @@ pub(super) fn run(
     })?;
     let environment = args.environment.as_deref().map(environment_argument).transpose()?;
     let device = device.open()?;
-    let mut session =
-        Session::new(&device, SessionOptions { shaders, extent: args.size, ..SessionOptions::default() })?;
+    let mut session = Session::new(
+        &device,
+        SessionOptions { shaders, watch_shaders, extent: args.size, ..SessionOptions::default() },
+    )?;
     session.open_at(&args.file, loaded, args.at)?;
     if args.at.is_some() && session.duration().is_none() {
         bail!("{}: --at was given, but no clip of it is played: nothing is animated", args.file.display());
@@ -93,8 +108,28 @@ pub(super) fn run(
         session.set_sample_offset(args.sample_offset)?;
     }
     let loaded_in = start.elapsed();
-    let run =
-        accumulate(&mut session, args, &progress).map_err(|error| session.advise_size(args.size, error))?;
+    picture(&mut session, args, kind, &progress, loaded_in)?;
+    if args.watch {
+        eprintln!("watching the shaders (end with Ctrl+C)");
+    }
+    while args.watch && woken.recv().is_ok() {
+        if session.take_over_shaders() {
+            picture(&mut session, args, kind, &progress, loaded_in)?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Renders one picture, writes it and says so.
+fn picture(
+    session: &mut Session,
+    args: &RenderArgs,
+    kind: Kind,
+    progress: &ProgressBar,
+    loaded_in: Duration,
+) -> anyhow::Result<()> {
+    let device = Arc::clone(session.device());
+    let run = accumulate(session, args, progress).map_err(|error| session.advise_size(args.size, error))?;
     progress.finish_and_clear();
     let metadata = Metadata {
         samples: run.samples,
@@ -117,7 +152,7 @@ pub(super) fn run(
     }
     report_validation(&device)?;
     if args.json {
-        say!("{}", summary(args, &session, &metadata, &run, noise, denoised, loaded_in));
+        say!("{}", summary(args, session, &metadata, &run, noise, denoised, loaded_in));
     } else {
         say!(
             "{}: {}x{}, {} samples in {:.2} s ({}), noise {}{}, {}",
@@ -132,7 +167,7 @@ pub(super) fn run(
             metadata.device
         );
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// Shows all instances that have a variant of materials of this name in it.

@@ -180,7 +180,10 @@ impl Session {
 
     /// Whether nothing is left to do: no sample, no structure that is still built or made better, no texture that waits.
     pub fn is_done(&self) -> bool {
-        self.is_converged() && !self.renderer.is_busy() && !self.textures_settle()
+        self.is_converged()
+            && !self.renderer.is_busy()
+            && !self.textures_settle()
+            && !self.renderer.shaders_wait()
     }
 
     /// Whether it is still open how much of the textures fits; when it is known, samples begin anew.

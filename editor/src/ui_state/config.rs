@@ -33,13 +33,15 @@ pub enum Tab {
     LeftOut,
     /// Findings of the audit.
     Health,
+    /// The shaders, to be edited.
+    Shaders,
     /// The log.
     Log,
 }
 
 impl Tab {
     /// Every panel, in the order of the menu.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::View,
         Self::Outliner,
         Self::Inspector,
@@ -49,6 +51,7 @@ impl Tab {
         Self::Acceleration,
         Self::LeftOut,
         Self::Health,
+        Self::Shaders,
         Self::Log,
     ];
 
@@ -64,6 +67,7 @@ impl Tab {
             Self::Acceleration => "Acceleration",
             Self::LeftOut => "Left out",
             Self::Health => "Health",
+            Self::Shaders => "Shaders",
             Self::Log => "Log",
         }
     }
@@ -75,7 +79,15 @@ pub fn default_layout() -> DockState<Tab> {
     let tree = dock.main_surface_mut();
     let [rest, _right] = tree.split_right(NodeIndex::root(), 0.78, vec![Tab::Inspector, Tab::Render]);
     let [rest, _left] = tree.split_left(rest, 0.22, vec![Tab::Outliner]);
-    let below = vec![Tab::Animation, Tab::Passes, Tab::Acceleration, Tab::LeftOut, Tab::Health, Tab::Log];
+    let below = vec![
+        Tab::Animation,
+        Tab::Passes,
+        Tab::Acceleration,
+        Tab::LeftOut,
+        Tab::Health,
+        Tab::Shaders,
+        Tab::Log,
+    ];
     let [_view, _below] = tree.split_below(rest, 0.76, below);
     dock
 }
@@ -272,7 +284,15 @@ mod tests {
         let closed = read_without(&gone, true);
         assert!(gone.iter().all(|tab| closed.find_tab(tab).is_none()));
         // None of its neighbours is left: it stands by itself, and what there was is still seen.
-        let below = [Tab::Animation, Tab::Passes, Tab::Acceleration, Tab::LeftOut, Tab::Health, Tab::Log];
+        let below = [
+            Tab::Animation,
+            Tab::Passes,
+            Tab::Acceleration,
+            Tab::LeftOut,
+            Tab::Health,
+            Tab::Shaders,
+            Tab::Log,
+        ];
         let alone = read_without(&below, false);
         assert!(Tab::ALL.iter().all(|tab| alone.find_tab(tab).is_some()));
         let view = alone.find_tab(&Tab::View).unwrap();

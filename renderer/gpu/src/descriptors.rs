@@ -20,9 +20,21 @@ const TEXTURES: u32 = 1;
 /// Binding of the environment map in set 0.
 const ENVIRONMENT: u32 = 2;
 
+/// The layout of set 0. Shared, so that pipelines can be made on another thread than the one that owns the set.
+pub struct SceneLayout {
+    pub(crate) raw: vk::DescriptorSetLayout,
+    device: Arc<Device>,
+}
+
+impl Drop for SceneLayout {
+    fn drop(&mut self) {
+        self.device.retire(Garbage::SetLayout(self.raw));
+    }
+}
+
 /// The descriptor set of the scene.
 pub struct SceneSet {
-    pub(crate) layout: vk::DescriptorSetLayout,
+    layout: Arc<SceneLayout>,
     pub(crate) set: vk::DescriptorSet,
     pool: vk::DescriptorPool,
     capacity: u32,
@@ -41,7 +53,7 @@ impl SceneSet {
         sampler: &Sampler,
     ) -> Result<Self> {
         let capacity = capacity.clamp(1, device.limits().max_textures.max(1));
-        let layout = create_layout(device, capacity)?;
+        let layout = SceneLayout { raw: create_layout(device, capacity)?, device: Arc::clone(device) };
         let sizes = [
             vk::DescriptorPoolSize {
                 ty: vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
@@ -59,17 +71,22 @@ impl SceneSet {
         // SAFETY: plain creation; destroyed through the retire queue.
         let pool =
             unsafe { device.raw.create_descriptor_pool(&info, None) }.during("vkCreateDescriptorPool")?;
-        let layouts = [layout];
+        let layouts = [layout.raw];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         // SAFETY: pool and layout are alive; the set dies with the pool.
         let set =
             unsafe { device.raw.allocate_descriptor_sets(&info) }.during("vkAllocateDescriptorSets")?[0];
-        let this = Self { layout, set, pool, capacity, device: Arc::clone(device) };
+        let this = Self { layout: Arc::new(layout), set, pool, capacity, device: Arc::clone(device) };
         for slot in 0..capacity {
             this.set_texture(slot, default_image, sampler);
         }
         this.set_environment(default_image, sampler);
         Ok(this)
+    }
+
+    /// Its layout; the same for every set of this capacity.
+    pub fn layout(&self) -> &Arc<SceneLayout> {
+        &self.layout
     }
 
     /// Number of texture slots.
@@ -123,7 +140,7 @@ impl SceneSet {
 
 impl Drop for SceneSet {
     fn drop(&mut self) {
-        self.device.retire(Garbage::DescriptorPool(self.pool, self.layout));
+        self.device.retire(Garbage::DescriptorPool(self.pool));
     }
 }
 

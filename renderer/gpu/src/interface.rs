@@ -5,7 +5,7 @@ use ash::vk;
 use crate::accel::AccelStructure;
 use crate::barrier::Access;
 use crate::buffer::Buffer;
-use crate::image::Image;
+use crate::image::{Format, Image};
 use crate::sampler::Sampler;
 
 /// What kind of descriptor a binding is.
@@ -52,6 +52,8 @@ pub struct Binding {
     pub binding: u32,
     /// Its kind.
     pub kind: BindingKind,
+    /// Of a storage image: the format that the shader declares, if it does.
+    pub format: Option<Format>,
 }
 
 /// What a pipeline needs from the host.
@@ -63,6 +65,43 @@ pub struct Interface {
     pub uses_scene: bool,
     /// Bytes of push constants.
     pub push_bytes: u32,
+}
+
+/// What sort of thing the host gives for a binding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BindSort {
+    /// See [`Bind::Image`].
+    Image(Format),
+    /// See [`Bind::Combined`].
+    Combined,
+    /// See [`Bind::Buffer`].
+    Buffer,
+    /// See [`Bind::Accel`].
+    Accel,
+}
+
+impl BindingKind {
+    /// Whether the host's thing can be bound here.
+    pub fn accepts(self, sort: BindSort) -> bool {
+        match self {
+            Self::SampledImage | Self::StorageImage(_) => matches!(sort, BindSort::Image(_)),
+            Self::CombinedImage => sort == BindSort::Combined,
+            Self::StorageBuffer(_) => sort == BindSort::Buffer,
+            Self::AccelStructure => sort == BindSort::Accel,
+        }
+    }
+}
+
+impl Bind<'_> {
+    /// What sort of thing it is.
+    pub fn sort(&self) -> BindSort {
+        match self {
+            Self::Image(image) => BindSort::Image(image.desc().format),
+            Self::Combined(..) => BindSort::Combined,
+            Self::Buffer(_) => BindSort::Buffer,
+            Self::Accel(_) => BindSort::Accel,
+        }
+    }
 }
 
 /// What the host gives for a binding.

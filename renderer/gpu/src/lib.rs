@@ -36,13 +36,13 @@ pub use background::{Background, BackgroundWork, Ticket};
 pub use barrier::{Access, Barrier, ResourceId, Stage, Tracker};
 pub use buffer::{Buffer, BufferUse, Location};
 pub use context::{Device, DeviceOptions, Limits};
-pub use descriptors::SceneSet;
+pub use descriptors::{SceneLayout, SceneSet};
 pub use device_choice::{Candidate, DeviceKind, Requirements, list_devices};
 pub use error::GpuError;
 pub use frames::{FrameResult, Frames};
 pub use image::{Format, Image, ImageDesc, ImageUse};
 pub use instance::{Instance, InstanceOptions, Message};
-pub use interface::{Bind, Binding, BindingKind, Interface};
+pub use interface::{Bind, BindSort, Binding, BindingKind, Interface};
 pub use memory::{MemoryBudget, MemoryUse};
 pub use pipeline::{
     ColorTarget, ComputePipeline, CullMode, GraphicsDesc, GraphicsPipeline, HitGroup, RayTracingDesc,

@@ -14,7 +14,7 @@ pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
 
 use crate::Result;
 use crate::context::Device;
-use crate::descriptors::SceneSet;
+use crate::descriptors::SceneLayout;
 use crate::error::{Context, GpuError};
 use crate::interface::Interface;
 use crate::retire::Garbage;
@@ -109,7 +109,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    fn new(device: &Device, name: &str, scene: Option<&SceneSet>, interface: &Interface) -> Result<Self> {
+    fn new(device: &Device, name: &str, scene: Option<&SceneLayout>, interface: &Interface) -> Result<Self> {
         let limit = device.limits().max_push_constants;
         if interface.push_bytes > limit {
             let (asked, limit) = (u64::from(interface.push_bytes), u64::from(limit));
@@ -138,7 +138,7 @@ impl Layout {
             set.inspect(|set| own_sets.push(*set)).during("vkCreateDescriptorSetLayout")
         };
         let set0 = match scene {
-            Some(scene) => scene.layout,
+            Some(scene) => scene.raw,
             None => make(vk::DescriptorSetLayoutCreateFlags::empty(), &[])?,
         };
         let set1 = make(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR, &pushed)?;

@@ -20,7 +20,8 @@ pub(crate) enum Garbage {
     AccelStructure(vk::AccelerationStructureKHR),
     Pipeline(vk::Pipeline, vk::PipelineLayout, Vec<vk::DescriptorSetLayout>),
     ShaderModule(vk::ShaderModule),
-    DescriptorPool(vk::DescriptorPool, vk::DescriptorSetLayout),
+    DescriptorPool(vk::DescriptorPool),
+    SetLayout(vk::DescriptorSetLayout),
     CommandPool(vk::CommandPool),
     QueryPool(vk::QueryPool),
     Semaphore(vk::Semaphore),
@@ -129,10 +130,8 @@ fn destroy(device: &Device, garbage: Garbage) {
                 sets.into_iter().for_each(|set| raw.destroy_descriptor_set_layout(set, None));
             }
             Garbage::ShaderModule(module) => raw.destroy_shader_module(module, None),
-            Garbage::DescriptorPool(pool, layout) => {
-                raw.destroy_descriptor_pool(pool, None);
-                raw.destroy_descriptor_set_layout(layout, None);
-            }
+            Garbage::DescriptorPool(pool) => raw.destroy_descriptor_pool(pool, None),
+            Garbage::SetLayout(layout) => raw.destroy_descriptor_set_layout(layout, None),
             Garbage::CommandPool(pool) => raw.destroy_command_pool(pool, None),
             Garbage::QueryPool(pool) => raw.destroy_query_pool(pool, None),
             Garbage::Semaphore(semaphore) => raw.destroy_semaphore(semaphore, None),

@@ -84,7 +84,8 @@ impl TextureSet {
 
 impl Drop for TextureSet {
     fn drop(&mut self) {
-        self.device.retire(Garbage::DescriptorPool(self.pool, self.layout));
+        self.device.retire(Garbage::DescriptorPool(self.pool));
+        self.device.retire(Garbage::SetLayout(self.layout));
         self.device.retire(Garbage::Sampler(self.sampler));
     }
 }

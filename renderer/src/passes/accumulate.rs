@@ -4,15 +4,16 @@ use caustica_gpu::{Access, Bind, Buffer, ComputePipeline, Recorder, Stage, Use};
 
 use super::{Builder, Scope};
 use crate::error::Result;
+use crate::shader::Live;
 use crate::view::Targets;
 
 /// The pass.
 pub(crate) struct Accumulate {
-    pipeline: ComputePipeline,
+    pipeline: Live<ComputePipeline>,
 }
 
 impl Accumulate {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         Ok(Self { pipeline: builder.compute("accumulate", "passes/accumulate/accumulate.comp")? })
     }
 

@@ -8,15 +8,15 @@ use caustica_gpu::{ComputePipeline, Device, Recorder, Use};
 use super::{table_groups, table_pass};
 use crate::error::Result;
 use crate::gpu_types::{Push, SurfaceJob};
-use crate::shader::ShaderLibrary;
+use crate::shader::{Live, ShaderLibrary};
 
 /// The pass.
 pub(crate) struct BlasSurface {
-    pipeline: ComputePipeline,
+    pipeline: Live<ComputePipeline>,
 }
 
 impl BlasSurface {
-    pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
         let file = "passes/blas_surface/blas_surface.comp";
         Ok(Self { pipeline: table_pass(device, library, "blas_surface", file)? })
     }
@@ -29,12 +29,13 @@ impl BlasSurface {
         uses: &[Use<'_>],
     ) -> Result<()> {
         let frame_address = recorder.stage_bytes(bytemuck::cast_slice(jobs))?;
+        let pipeline = self.pipeline.get(&[]);
         recorder.pass("accel.surface", |recorder| {
             recorder.declare(uses);
             for (argument0, job) in (0..).zip(jobs) {
                 let push = Push { frame_address, argument0, argument1: 0 };
                 let groups = table_groups(job.cluster_count);
-                recorder.dispatch(&self.pipeline, None, &[], &[], bytemuck::bytes_of(&push), groups)?;
+                recorder.dispatch(&pipeline, None, &[], &[], bytemuck::bytes_of(&push), groups)?;
             }
             Ok(())
         })

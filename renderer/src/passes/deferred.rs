@@ -16,7 +16,7 @@ pub(crate) struct Deferred {
 }
 
 impl Deferred {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         Ok(Self {
             shadow: builder.needs.direct_light().then(|| Shadow::new(builder)).transpose()?,
             shading: Shading::new(builder)?,

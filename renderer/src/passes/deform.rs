@@ -7,15 +7,15 @@ use caustica_gpu::{Access, ComputePipeline, Device, Recorder, ResourceId, Stage,
 use super::{table_groups, table_pass};
 use crate::error::Result;
 use crate::gpu_types::{DeformJob, Push};
-use crate::shader::ShaderLibrary;
+use crate::shader::{Live, ShaderLibrary};
 
 /// The pass.
 pub(crate) struct Deform {
-    pipeline: ComputePipeline,
+    pipeline: Live<ComputePipeline>,
 }
 
 impl Deform {
-    pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
         Ok(Self { pipeline: table_pass(device, library, "deform", "passes/deform/deform.comp")? })
     }
 
@@ -30,13 +30,14 @@ impl Deform {
             return Ok(());
         }
         let frame_address = recorder.stage_bytes(bytemuck::cast_slice(jobs))?;
+        let pipeline = self.pipeline.get(&[]);
         recorder.pass("deform", |recorder| {
             // Declared once: the jobs write vertices of their own, so they may run side by side.
             recorder.declare(&[Use::Group(geometry, Stage::Compute, Access::StorageReadWrite)]);
             for (argument0, job) in (0..).zip(jobs) {
                 let push = Push { frame_address, argument0, argument1: 0 };
                 let groups = table_groups(job.vertex_count);
-                recorder.dispatch(&self.pipeline, None, &[], &[], bytemuck::bytes_of(&push), groups)?;
+                recorder.dispatch(&pipeline, None, &[], &[], bytemuck::bytes_of(&push), groups)?;
             }
             Ok(())
         })

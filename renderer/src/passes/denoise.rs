@@ -5,6 +5,7 @@ use caustica_gpu::{Bind, Buffer, ComputePipeline, Image, Recorder};
 
 use super::{Builder, Scope, Temporal};
 use crate::error::Result;
+use crate::shader::Live;
 use crate::view::{History, Targets};
 
 /// Pixels between the taps of each step of the filter.
@@ -29,17 +30,17 @@ pub(crate) struct Denoise {
     temporal: Temporal,
     filter: Option<Filter>,
     /// Where light is put back after shading: what rays bring is denoised.
-    compose: Option<ComputePipeline>,
+    compose: Option<Live<ComputePipeline>>,
 }
 
 struct Filter {
-    variance: ComputePipeline,
-    step: ComputePipeline,
+    variance: Live<ComputePipeline>,
+    step: Live<ComputePipeline>,
 }
 
 impl Denoise {
     /// The passes that the needs ask for; `None`: nothing is denoised.
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Option<Self>> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Option<Self>> {
         let needs = builder.needs;
         if !(needs.temporal && needs.direct_light()) {
             return Ok(None);

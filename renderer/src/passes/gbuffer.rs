@@ -1,49 +1,55 @@
 //! Pass `gbuffer`: what is seen through every pixel. Enters: instances, materials. Leaves: ids, normals, material,
 //! motion, depth. By raster (ids first, then resolved once a pixel) or by rays, with the same result.
 
+use std::sync::Arc;
+
 use caustica_gpu::{
-    Bind, ColorTarget, ComputePipeline, CullMode, Draw, Format, GraphicsDesc, GraphicsPipeline, Image,
-    RayTracingPipeline, Recorder, Stage,
+    Bind, ComputePipeline, CullMode, Draw, GraphicsPipeline, Image, RayTracingPipeline, Recorder, Stage,
 };
 
 use super::{Builder, Scope};
 use crate::error::Result;
 use crate::gpu_types::{Push, SHAPE_VERTICES};
-use crate::shader::merge_interfaces;
+use crate::shader::Live;
 use crate::tables::Batch;
 use crate::view::Targets;
 
 /// The pass.
 pub(crate) enum GBuffer {
     Raster {
-        opaque: GraphicsPipeline,
-        alpha: Option<GraphicsPipeline>,
-        shapes: Option<GraphicsPipeline>,
-        resolve: ComputePipeline,
+        opaque: Live<GraphicsPipeline>,
+        alpha: Option<Live<GraphicsPipeline>>,
+        shapes: Option<Live<GraphicsPipeline>>,
+        resolve: Live<ComputePipeline>,
     },
     Rays {
-        trace: RayTracingPipeline,
+        trace: Live<RayTracingPipeline>,
     },
 }
 
 impl GBuffer {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         if builder.needs.primary_rays {
             return Ok(Self::Rays { trace: builder.rays("gbuffer.trace", "passes/gbuffer/gbuffer.rgen")? });
         }
         let needs = builder.needs;
-        let mut raster = |label, vertex, fragment| raster(builder, label, vertex, fragment);
         let triangles = "passes/gbuffer/visibility.vert";
         Ok(Self::Raster {
-            opaque: raster("gbuffer.raster", triangles, "passes/gbuffer/visibility.frag")?,
+            opaque: builder.raster("gbuffer.raster", triangles, "passes/gbuffer/visibility.frag")?,
             alpha: needs
                 .alpha
-                .then(|| raster("gbuffer.raster alpha", triangles, "passes/gbuffer/visibility_alpha.frag"))
+                .then(|| {
+                    builder.raster("gbuffer.raster alpha", triangles, "passes/gbuffer/visibility_alpha.frag")
+                })
                 .transpose()?,
             shapes: needs
                 .shapes
                 .then(|| {
-                    raster("gbuffer.raster shapes", "passes/gbuffer/shape.vert", "passes/gbuffer/shape.frag")
+                    builder.raster(
+                        "gbuffer.raster shapes",
+                        "passes/gbuffer/shape.vert",
+                        "passes/gbuffer/shape.frag",
+                    )
                 })
                 .transpose()?,
             resolve: builder.compute("gbuffer.resolve", "passes/gbuffer/resolve.comp")?,
@@ -72,7 +78,8 @@ impl GBuffer {
         match self {
             Self::Rays { trace } => scope.whole().rays(recorder, "gbuffer.trace", trace, &binds, &[], 1),
             Self::Raster { opaque, alpha, shapes, resolve } => {
-                let pipelines = [Some(opaque), alpha.as_ref(), shapes.as_ref()];
+                let pipelines = [Some(opaque), alpha.as_ref(), shapes.as_ref()]
+                    .map(|live| live.map(|live| live.get(&[])));
                 draw(recorder, scope, pipelines, &targets.id, depth)?;
                 scope.compute(recorder, "gbuffer.resolve", resolve, &binds, &[], 0)
             }
@@ -80,30 +87,11 @@ impl GBuffer {
     }
 }
 
-fn raster(
-    builder: &mut Builder<'_>,
-    label: &str,
-    vertex_file: &str,
-    fragment_file: &str,
-) -> Result<GraphicsPipeline> {
-    let vertex = builder.library.stage(vertex_file)?;
-    let fragment = builder.library.stage(fragment_file)?;
-    let interface = merge_interfaces(&[&vertex, &fragment])?;
-    let desc = GraphicsDesc {
-        name: label,
-        vertex: &vertex.module,
-        fragment: &fragment.module,
-        colors: &[ColorTarget { format: Format::Rgba32Uint }],
-        depth: Some(Format::Depth32),
-    };
-    Ok(GraphicsPipeline::new(builder.device, &desc, &interface, &builder.specialization, Some(builder.set))?)
-}
-
 /// `pipelines`: of opaque triangles, of triangles with alpha, of shapes.
 fn draw(
     recorder: &mut Recorder,
     scope: &Scope<'_>,
-    pipelines: [Option<&GraphicsPipeline>; 3],
+    pipelines: [Option<Arc<GraphicsPipeline>>; 3],
     id: &Image,
     depth: &Image,
 ) -> Result<()> {
@@ -115,8 +103,11 @@ fn draw(
         let list = if draw.indices.is_none() { 2 } else { usize::from(batch.key.alpha) };
         lists[list].push(draw);
     }
-    let pipelines: Vec<(&GraphicsPipeline, &[Draw<'_>])> =
-        pipelines.into_iter().zip(&lists).filter_map(|(pipeline, list)| Some((pipeline?, &**list))).collect();
+    let pipelines: Vec<(&GraphicsPipeline, &[Draw<'_>])> = pipelines
+        .iter()
+        .zip(&lists)
+        .filter_map(|(pipeline, list)| Some((pipeline.as_deref()?, &**list)))
+        .collect();
     let uses = scope.tables.uses(Stage::Raster);
     recorder.pass("gbuffer.raster", |recorder| {
         recorder.draw(&pipelines, Some(scope.set), &[], &uses, &[id], Some(depth), scope.extent)

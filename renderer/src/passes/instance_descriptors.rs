@@ -7,7 +7,7 @@ use caustica_gpu::{ComputePipeline, Device, Recorder, Use};
 use super::{table_groups, table_pass};
 use crate::error::Result;
 use crate::gpu_types::{InstanceDescriptorJob, Push};
-use crate::shader::ShaderLibrary;
+use crate::shader::{Live, ShaderLibrary};
 
 /// Device addresses of the tables that the pass reads and writes.
 #[derive(Clone, Copy, Debug)]
@@ -24,11 +24,11 @@ pub(crate) struct DescriptorAddresses {
 
 /// The pass.
 pub(crate) struct InstanceDescriptors {
-    pipeline: ComputePipeline,
+    pipeline: Live<ComputePipeline>,
 }
 
 impl InstanceDescriptors {
-    pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
         let file = "passes/instance_descriptors/instance_descriptors.comp";
         Ok(Self { pipeline: table_pass(device, library, "instance_descriptors", file)? })
     }
@@ -54,9 +54,10 @@ impl InstanceDescriptors {
         let job = InstanceDescriptorJob { instances, slots, blases, descriptors, dirty, count, pad0: 0 };
         let frame_address = recorder.stage_bytes(bytemuck::bytes_of(&job))?;
         let push = Push { frame_address, argument0: 0, argument1: 0 };
+        let pipeline = self.pipeline.get(&[]);
         recorder.pass("instance_descriptors", |recorder| {
             let push = bytemuck::bytes_of(&push);
-            recorder.dispatch(&self.pipeline, None, &[], uses, push, table_groups(count))
+            recorder.dispatch(&pipeline, None, &[], uses, push, table_groups(count))
         })?;
         Ok(())
     }

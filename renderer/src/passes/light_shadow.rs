@@ -6,14 +6,15 @@ use caustica_gpu::{Bind, Image, RayTracingPipeline, Recorder};
 use super::{Builder, Scope};
 use crate::error::Result;
 use crate::gpu_types::LIGHT_SHADOW_FRESH;
+use crate::shader::Live;
 
 /// The pass.
 pub(crate) struct LightShadow {
-    trace: RayTracingPipeline,
+    trace: Live<RayTracingPipeline>,
 }
 
 impl LightShadow {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         Ok(Self { trace: builder.rays("light_shadow.trace", "passes/light_shadow/light_shadow.rgen")? })
     }
 

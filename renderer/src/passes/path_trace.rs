@@ -6,16 +6,17 @@ use caustica_gpu::{Bind, RayTracingPipeline, Recorder};
 use super::denoise::Moving;
 use super::{Builder, Denoise, Scope};
 use crate::error::Result;
+use crate::shader::Live;
 use crate::view::Targets;
 
 /// The pass.
 pub(crate) struct PathTrace {
-    pipeline: RayTracingPipeline,
+    pipeline: Live<RayTracingPipeline>,
     pub(super) denoise: Option<Denoise>,
 }
 
 impl PathTrace {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         let pipeline = builder.rays("path_trace", "passes/path_trace/path_trace.rgen")?;
         Ok(Self { pipeline, denoise: Denoise::new(builder)? })
     }

@@ -7,19 +7,20 @@ use super::{Builder, Scope};
 use crate::error::Result;
 use crate::gpu_types as constants;
 use crate::settings::Show;
+use crate::shader::Live;
 use crate::view::Targets;
 
 /// The pass.
 pub(crate) struct Post {
-    image: ComputePipeline,
+    image: Live<ComputePipeline>,
     /// Made when a target is shown for the first time.
-    target: Option<ComputePipeline>,
+    target: Option<Live<ComputePipeline>>,
     /// Made when edges or barycentric coordinates are shown for the first time.
-    surface: Option<ComputePipeline>,
+    surface: Option<Live<ComputePipeline>>,
     /// Made when dropped samples are shown for the first time.
-    non_finite: Option<ComputePipeline>,
+    non_finite: Option<Live<ComputePipeline>>,
     /// Made for the first view with a window.
-    window: Option<ComputePipeline>,
+    window: Option<Live<ComputePipeline>>,
 }
 
 /// What a frame shows.
@@ -50,13 +51,13 @@ enum Way<'a> {
 }
 
 impl Post {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         let image = builder.compute("post", "passes/post/post.comp")?;
         Ok(Self { image, target: None, surface: None, non_finite: None, window: None })
     }
 
     /// Makes what a view asks for and was not asked for before.
-    pub(crate) fn prepare(&mut self, builder: &mut Builder<'_>, show: Show, window: bool) -> Result<()> {
+    pub(crate) fn prepare(&mut self, builder: &Builder<'_>, show: Show, window: bool) -> Result<()> {
         let (pipeline, label, file) = match show {
             Show::Image => (None, "", ""),
             Show::Wireframe | Show::Barycentric => {
@@ -139,7 +140,7 @@ impl Post {
 fn show_target(
     recorder: &mut Recorder,
     scope: &Scope<'_>,
-    pipeline: Option<&ComputePipeline>,
+    pipeline: Option<&Live<ComputePipeline>>,
     kind: u32,
     [float, integer]: [&Image; 2],
     display: (&str, Bind<'_>),

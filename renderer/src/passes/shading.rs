@@ -6,16 +6,17 @@ use caustica_gpu::{Bind, ComputePipeline, Image, RayTracingPipeline, Recorder};
 
 use super::{Builder, Scope};
 use crate::error::Result;
+use crate::shader::Live;
 use crate::view::Targets;
 
 /// The pass.
 pub(crate) enum Shading {
-    Rays(RayTracingPipeline),
-    NoRays(ComputePipeline),
+    Rays(Live<RayTracingPipeline>),
+    NoRays(Live<ComputePipeline>),
 }
 
 impl Shading {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         if builder.needs.secondary_rays() {
             return Ok(Self::Rays(builder.rays("shading.trace", "passes/shading/shading.rgen")?));
         }

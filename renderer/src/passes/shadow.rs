@@ -6,16 +6,17 @@ use caustica_gpu::{Access, Bind, ComputePipeline, RayTracingPipeline, Recorder, 
 use super::denoise::Moving;
 use super::{Builder, Scope};
 use crate::error::Result;
+use crate::shader::Live;
 use crate::view::Targets;
 
 /// The pass.
 pub(crate) enum Shadow {
-    Rays(RayTracingPipeline),
-    NoRays(ComputePipeline),
+    Rays(Live<RayTracingPipeline>),
+    NoRays(Live<ComputePipeline>),
 }
 
 impl Shadow {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         if builder.needs.shadow_rays {
             return Ok(Self::Rays(builder.rays("shadow.trace", "passes/shadow/shadow.rgen")?));
         }

@@ -7,15 +7,15 @@ use caustica_gpu::{Access, ComputePipeline, Device, Recorder, ResourceId, Stage,
 use super::{table_groups, table_pass};
 use crate::error::Result;
 use crate::gpu_types::{Push, ShapeBoxJob};
-use crate::shader::ShaderLibrary;
+use crate::shader::{Live, ShaderLibrary};
 
 /// The pass.
 pub(crate) struct ShapeBoxes {
-    pipeline: ComputePipeline,
+    pipeline: Live<ComputePipeline>,
 }
 
 impl ShapeBoxes {
-    pub(crate) fn new(device: &Arc<Device>, library: &mut ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
         Ok(Self {
             pipeline: table_pass(device, library, "shape_boxes", "passes/shape_boxes/shape_boxes.comp")?,
         })
@@ -32,13 +32,14 @@ impl ShapeBoxes {
             return Ok(());
         }
         let frame_address = recorder.stage_bytes(bytemuck::cast_slice(jobs))?;
+        let pipeline = self.pipeline.get(&[]);
         recorder.pass("shape_boxes", |recorder| {
             // Declared once: the jobs write boxes of their own, so they may run side by side.
             recorder.declare(&[Use::Group(geometry, Stage::Compute, Access::StorageReadWrite)]);
             for (argument0, job) in (0..).zip(jobs) {
                 let push = Push { frame_address, argument0, argument1: 0 };
                 let groups = table_groups(job.count);
-                recorder.dispatch(&self.pipeline, None, &[], &[], bytemuck::bytes_of(&push), groups)?;
+                recorder.dispatch(&pipeline, None, &[], &[], bytemuck::bytes_of(&push), groups)?;
             }
             Ok(())
         })

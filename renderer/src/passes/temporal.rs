@@ -7,15 +7,16 @@ use caustica_gpu::{Access, Bind, ComputePipeline, Recorder, Stage, Use};
 use super::denoise::Moving;
 use super::{Builder, Scope};
 use crate::error::Result;
+use crate::shader::Live;
 use crate::view::{History, Targets};
 
 /// The pass.
 pub(crate) struct Temporal {
-    pipeline: ComputePipeline,
+    pipeline: Live<ComputePipeline>,
 }
 
 impl Temporal {
-    pub(crate) fn new(builder: &mut Builder<'_>) -> Result<Self> {
+    pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         Ok(Self { pipeline: builder.compute("temporal", "passes/temporal/temporal.comp")? })
     }
 

@@ -12,6 +12,7 @@ use glslang::{
     SourceLanguage, SpirvVersion, Target, VulkanVersion,
 };
 
+use super::fault::ShaderFault;
 use super::sources::Source;
 use crate::error::{RendererError, Result};
 
@@ -107,7 +108,10 @@ impl IncludeHandler for Includes<'_> {
 }
 
 fn compile_now(source: &Source) -> Result<Vec<u32>> {
-    let refuse = |log: String| RendererError::Compile { file: source.file.clone(), log };
+    let refuse = |log: String| RendererError::Compile {
+        file: source.file.clone(),
+        faults: ShaderFault::of_log(&log, &source.file, &source.texts),
+    };
     let compiler = Compiler::acquire().ok_or_else(|| refuse(String::from("glslang did not start")))?;
     let stage =
         stage_of(&source.file).ok_or_else(|| refuse(String::from("unknown stage: see the file's ending")))?;
@@ -122,9 +126,9 @@ fn compile_now(source: &Source) -> Result<Vec<u32>> {
     let mut includes = Includes { texts: &source.texts };
     let input =
         ShaderInput::new(&glsl, stage, &options, None::<&[(&str, Option<&str>)]>, Some(&mut includes))
-            .map_err(|error| refuse(readable(&error, &source.file)))?;
-    let shader = compiler.create_shader(input).map_err(|error| refuse(readable(&error, &source.file)))?;
-    shader.compile().map_err(|error| refuse(readable(&error, &source.file)))
+            .map_err(|error| refuse(log_of(&error)))?;
+    let shader = compiler.create_shader(input).map_err(|error| refuse(log_of(&error)))?;
+    shader.compile().map_err(|error| refuse(log_of(&error)))
 }
 
 fn stage_of(file: &str) -> Option<ShaderStage> {
@@ -141,27 +145,15 @@ fn stage_of(file: &str) -> Option<ShaderStage> {
     })
 }
 
-/// The error lines of glslang, with the main file's name in place of the `0` that glslang gives it.
-fn readable(error: &GlslangError, file: &str) -> String {
-    let log = match error {
+/// What glslang says.
+fn log_of(error: &GlslangError) -> String {
+    match error {
         GlslangError::PreprocessError(log)
         | GlslangError::ParseError(log)
         | GlslangError::MapIoError(log)
         | GlslangError::LinkError(log) => log.log.clone(),
         other => other.to_string(),
-    };
-    let mut lines: Vec<String> = log
-        .lines()
-        .filter(|line| !line.trim().is_empty() && !line.contains("compilation errors"))
-        .map(|line| match line.strip_prefix("ERROR: ") {
-            Some(rest) => {
-                rest.strip_prefix("0:").map_or_else(|| rest.to_owned(), |rest| format!("{file}:{rest}"))
-            }
-            None => line.to_owned(),
-        })
-        .collect();
-    lines.dedup();
-    lines.join("\n")
+    }
 }
 
 #[cfg(test)]

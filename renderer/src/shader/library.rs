@@ -1,13 +1,19 @@
-//! Compiled stages by file, each compiled once. Enters: file names. Leaves: modules with their interfaces.
+//! Compiled stages by file, each compiled once, and the pipelines made of them, which may be replaced while they are in use.
+//! Enters: file names. Leaves: stages with their interfaces, and [`Live`] pipelines.
 
-use std::collections::HashMap;
-use std::sync::Arc;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use caustica_gpu::{Device, Interface, ShaderModule};
 
 use super::compile::{SpirvCache, compile};
+use super::fault::ShaderFault;
+use super::live::{Live, Make, Owner, Replaceable};
+use super::payloads::RayInterface;
 use super::reflect::reflect;
-use super::sources::ShaderSources;
+use super::sources::{ShaderSources, Source};
 use crate::error::{RendererError, Result};
 
 /// A stage, ready for a pipeline.
@@ -16,39 +22,147 @@ pub struct Compiled {
     pub module: ShaderModule,
     /// What it binds.
     pub interface: Interface,
-    /// Main file.
-    pub file: String,
+    pub(super) rays: RayInterface,
+    pub(super) source: Source,
 }
 
-/// All stages compiled so far.
+impl Compiled {
+    /// Compiles a main file with everything it includes, or takes an earlier result from the cache.
+    ///
+    /// # Errors
+    /// When it does not compile, or binds what the host does not offer.
+    pub fn new(device: &Arc<Device>, source: Source, cache: &SpirvCache) -> Result<Self> {
+        let words = compile(&source, cache)?;
+        let interface = reflect(&source.file, &words)?.interface;
+        let module = ShaderModule::new(device, &source.file, &words)?;
+        Ok(Self { module, interface, rays: RayInterface::of(&words), source })
+    }
+
+    /// Main file.
+    pub fn file(&self) -> &str {
+        &self.source.file
+    }
+}
+
+/// All stages compiled so far, and the pipelines in use. Shared with the thread that compiles what was edited.
 pub struct ShaderLibrary {
-    device: Arc<Device>,
-    sources: ShaderSources,
-    cache: SpirvCache,
-    stages: HashMap<String, Arc<Compiled>>,
+    pub(super) device: Arc<Device>,
+    sources: Mutex<ShaderSources>,
+    pub(super) cache: SpirvCache,
+    /// Shaders are edited: one that is broken when it is needed for the first time is replaced by the built-in one.
+    edited: AtomicBool,
+    stages: Mutex<HashMap<String, Arc<Compiled>>>,
+    replaced: Mutex<Vec<ShaderFault>>,
+    live: Mutex<Vec<Weak<dyn Replaceable>>>,
 }
 
 impl ShaderLibrary {
-    /// An empty library.
-    pub fn new(device: &Arc<Device>, sources: ShaderSources, cache: SpirvCache) -> Self {
-        Self { device: Arc::clone(device), sources, cache, stages: HashMap::new() }
+    /// An empty library. `edited`: a stage that is broken when it is needed first is replaced by the built-in one.
+    pub fn new(device: &Arc<Device>, sources: ShaderSources, cache: SpirvCache, edited: bool) -> Self {
+        let device = Arc::clone(device);
+        let (stages, replaced, live) = Default::default();
+        let (sources, edited) = (Mutex::new(sources), AtomicBool::new(edited));
+        Self { device, sources, cache, edited, stages, replaced, live }
     }
 
     /// The stage of a main file; compiled at the first call.
     ///
     /// # Errors
     /// When a file is missing, does not compile, or binds what the host does not offer.
-    pub fn stage(&mut self, file: &str) -> Result<Arc<Compiled>> {
-        if let Some(stage) = self.stages.get(file) {
-            return Ok(Arc::clone(stage));
+    pub fn stage(&self, file: &str) -> Result<Arc<Compiled>> {
+        if let Some(stage) = self.known(file) {
+            return Ok(stage);
         }
-        let words = compile(&self.sources.load(file)?, &self.cache)?;
-        let interface = reflect(file, &words)?.interface;
-        let module = ShaderModule::new(&self.device, file, &words)?;
-        let stage = Arc::new(Compiled { module, interface, file: file.to_owned() });
-        self.stages.insert(file.to_owned(), Arc::clone(&stage));
+        let compiled =
+            |sources: &ShaderSources| Compiled::new(&self.device, sources.load(file)?, &self.cache);
+        let stage = match compiled(&self.sources()) {
+            Err(error) if self.edited.load(Ordering::Relaxed) => match compiled(&ShaderSources::default()) {
+                Ok(built_in) => {
+                    lock(&self.replaced).extend(ShaderFault::of_error(error));
+                    built_in
+                }
+                Err(_) => return Err(error),
+            },
+            other => other?,
+        };
+        let stage = Arc::new(stage);
+        lock(&self.stages).insert(file.to_owned(), Arc::clone(&stage));
         Ok(stage)
     }
+
+    /// What was wrong with stages that were needed for the first time, since this was asked last.
+    pub(super) fn take_replaced(&self) -> Vec<ShaderFault> {
+        std::mem::take(&mut *lock(&self.replaced))
+    }
+
+    /// Where shaders come from.
+    pub(super) fn sources(&self) -> ShaderSources {
+        lock(&self.sources).clone()
+    }
+
+    /// The folder that shaders come from.
+    pub(crate) fn folder(&self) -> Option<PathBuf> {
+        lock(&self.sources).folder().map(Path::to_owned)
+    }
+
+    /// Shaders come from a folder from now on, and are edited there.
+    pub(crate) fn edit(&self, folder: &Path) {
+        *lock(&self.sources) = ShaderSources::new(Some(folder.to_owned()));
+        self.edited.store(true, Ordering::Relaxed);
+    }
+
+    /// Every stage compiled so far.
+    pub(super) fn all_stages(&self) -> Vec<Arc<Compiled>> {
+        lock(&self.stages).values().cloned().collect()
+    }
+
+    /// The main files of all stages compiled so far, each with every file that it includes.
+    pub fn files(&self) -> BTreeMap<String, Vec<String>> {
+        let includes = |stage: &Compiled| {
+            stage.source.texts.keys().filter(|file| *file != stage.file()).cloned().collect()
+        };
+        self.all_stages().iter().map(|stage| (stage.file().to_owned(), includes(stage))).collect()
+    }
+
+    pub(super) fn known(&self, file: &str) -> Option<Arc<Compiled>> {
+        lock(&self.stages).get(file).cloned()
+    }
+
+    /// Makes a pipeline of these main files that is made anew when they change.
+    pub(crate) fn live<P: Send + Sync + 'static>(
+        &self,
+        files: &[&'static str],
+        owner: &Arc<Owner>,
+        make: Make<P>,
+    ) -> Result<Live<P>> {
+        let live = Live::new(files, owner, make, &|file| self.stage(file))?;
+        let mut all = lock(&self.live);
+        all.retain(|other| other.strong_count() > 0);
+        all.push(live.as_replaceable());
+        Ok(live)
+    }
+
+    /// The pipelines in use.
+    pub(super) fn all_live(&self) -> Vec<Arc<dyn Replaceable>> {
+        lock(&self.live).iter().filter_map(Weak::upgrade).collect()
+    }
+
+    /// Takes over stages that were compiled anew. What was made of the old ones and is not in use is made anew when it is.
+    pub(super) fn put(&self, stages: Vec<Arc<Compiled>>) {
+        let files: BTreeSet<String> = stages.iter().map(|stage| stage.file().to_owned()).collect();
+        lock(&self.stages).extend(stages.into_iter().map(|stage| (stage.file().to_owned(), stage)));
+        for live in self.all_live() {
+            let stale = live.files().iter().any(|file| files.contains(*file))
+                && !live.is_of(&|file| self.known(file));
+            if stale {
+                live.owner().set_outdated();
+            }
+        }
+    }
+}
+
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The interface of a pipeline made of several stages: the same name must be the same binding everywhere.
@@ -64,14 +178,14 @@ pub fn merge_interfaces(stages: &[&Compiled]) -> Result<Interface> {
         for binding in &stage.interface.bindings {
             match merged.bindings.iter().find(|known| known.binding == binding.binding) {
                 None => {
-                    origin.insert(binding.binding, &stage.file);
+                    origin.insert(binding.binding, stage.file());
                     merged.bindings.push(binding.clone());
                 }
                 Some(known) if known == binding => {}
                 Some(known) => {
                     let other = origin.get(&binding.binding).copied().unwrap_or("another stage");
                     return Err(RendererError::Interface {
-                        file: stage.file.clone(),
+                        file: stage.file().to_owned(),
                         reason: format!(
                             "binding {} of set 1 is '{}' ({:?}) here and '{}' ({:?}) in {other}",
                             binding.binding, binding.name, binding.kind, known.name, known.kind

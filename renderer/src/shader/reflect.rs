@@ -2,9 +2,10 @@
 //! set 1 is given to the host by name. A binding that does not fit is refused before the driver sees it:
 //! validation does not catch it reliably, and some drivers crash.
 
-use caustica_gpu::{Access, Binding, BindingKind, Interface};
+use caustica_gpu::{Access, Binding, BindingKind, Format, Interface};
 use spirq::ReflectConfig;
-use spirq::ty::{AccessType, DescriptorType};
+use spirq::spirv::ImageFormat;
+use spirq::ty::{AccessType, DescriptorType, Type};
 use spirq::var::Variable;
 
 use crate::error::{RendererError, Result};
@@ -40,7 +41,7 @@ pub fn reflect(file: &str, words: &[u32]) -> Result<Reflection> {
     let mut interface = Interface::default();
     for variable in &entry.vars {
         match variable {
-            Variable::Descriptor { name, desc_bind, desc_ty, .. } => {
+            Variable::Descriptor { name, desc_bind, desc_ty, ty, .. } => {
                 let name = name.clone().unwrap_or_default();
                 match desc_bind.set() {
                     0 => check_scene_binding(file, &name, desc_bind.bind(), desc_ty)?,
@@ -48,6 +49,7 @@ pub fn reflect(file: &str, words: &[u32]) -> Result<Reflection> {
                         kind: kind_of(desc_ty)
                             .ok_or_else(|| refuse(format!("'{name}' is of an unknown kind")))?,
                         binding: desc_bind.bind(),
+                        format: format_of(ty),
                         name,
                     }),
                     set => return Err(refuse(format!("'{name}' is in set {set}; only 0 and 1 exist"))),
@@ -107,6 +109,23 @@ fn check_scene_binding(file: &str, name: &str, binding: u32, found: &DescriptorT
         None => format!("'{name}' at set 0, binding {binding}: the scene has no such binding"),
     };
     Err(RendererError::Interface { file: file.to_owned(), reason })
+}
+
+/// The format that a storage image is declared with.
+fn format_of(ty: &Type) -> Option<Format> {
+    let Type::StorageImage(image) = ty else { return None };
+    Some(match image.fmt {
+        ImageFormat::Rgba8 => Format::Rgba8Unorm,
+        ImageFormat::Rgba16f => Format::Rgba16Float,
+        ImageFormat::Rgba32f => Format::Rgba32Float,
+        ImageFormat::Rg16f => Format::Rg16Float,
+        ImageFormat::Rg32f => Format::Rg32Float,
+        ImageFormat::R32f => Format::R32Float,
+        ImageFormat::Rg32ui => Format::Rg32Uint,
+        ImageFormat::Rgba32ui => Format::Rgba32Uint,
+        ImageFormat::R32ui => Format::R32Uint,
+        _ => return None,
+    })
 }
 
 fn kind_of(descriptor: &DescriptorType) -> Option<BindingKind> {

@@ -2,7 +2,7 @@
 //! a main file includes. Paths never leave the folder.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use include_dir::{Dir, include_dir};
 
@@ -32,6 +32,23 @@ impl ShaderSources {
         Self { folder }
     }
 
+    /// The folder, where it is not the copy in the binary.
+    pub fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
+    /// Every file of the copy in the binary, in order of their paths.
+    pub fn built_in_files() -> Vec<String> {
+        let mut files = Vec::new();
+        let mut folders = vec![&EMBEDDED];
+        while let Some(folder) = folders.pop() {
+            folders.extend(folder.dirs());
+            files.extend(folder.files().filter_map(|file| file.path().to_str()).map(str::to_owned));
+        }
+        files.sort();
+        files
+    }
+
     /// Reads one file.
     ///
     /// # Errors
@@ -56,13 +73,19 @@ impl ShaderSources {
     /// # Errors
     /// [`RendererError::Source`] naming the file that is missing.
     pub fn load(&self, file: &str) -> Result<Source> {
+        self.load_with(file, &mut BTreeMap::new())
+    }
+
+    /// The same; `known` holds files that were read before and gets those that are read now.
+    pub(super) fn load_with(&self, file: &str, known: &mut BTreeMap<String, String>) -> Result<Source> {
         let mut texts = BTreeMap::new();
         let mut waiting = vec![file.to_owned()];
         while let Some(next) = waiting.pop() {
             if texts.contains_key(&next) {
                 continue;
             }
-            let text = self.read(&next).map_err(|error| match error {
+            let read = known.get(&next).map_or_else(|| self.read(&next), |text| Ok(text.clone()));
+            let text = read.map_err(|error| match error {
                 RendererError::Source { file: missing, reason } if missing != file => RendererError::Source {
                     file: file.to_owned(),
                     reason: format!("include \"{missing}\": {reason}"),
@@ -70,6 +93,7 @@ impl ShaderSources {
                 other => other,
             })?;
             waiting.extend(includes_of(&text).map(str::to_owned));
+            known.entry(next.clone()).or_insert_with(|| text.clone());
             texts.insert(next, text);
         }
         Ok(Source { file: file.to_owned(), texts })

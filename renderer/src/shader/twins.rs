@@ -84,7 +84,7 @@ fn read(words: &[u32]) -> Structs {
 }
 
 /// A literal string: UTF-8, four bytes a word, ended by a zero.
-fn text_of(words: &[u32]) -> String {
+pub(super) fn text_of(words: &[u32]) -> String {
     let bytes: Vec<u8> =
         words.iter().flat_map(|word| word.to_le_bytes()).take_while(|byte| *byte != 0).collect();
     String::from_utf8_lossy(&bytes).into_owned()

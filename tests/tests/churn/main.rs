@@ -42,6 +42,7 @@ fn settings(pipeline: Pipeline, needs: NeedsMode) -> ViewSettings {
 fn new_session(gpu: &gpu::Session, needs: NeedsMode, acceleration: Option<AccelPolicy>) -> Session {
     let options = SessionOptions {
         shaders: shaders_under_test(),
+        watch_shaders: None,
         settings: settings(Pipeline::Hybrid, needs),
         extent: SMALL,
         window: false,

@@ -6,15 +6,13 @@ use std::sync::Arc;
 use caustica_gpu::{
     AccelBuild, AccelGeometry, AccelStructure, Access, Bind, BoxGeometry, Buffer, BufferUse, BuildMode,
     BuildPreference, ComputePipeline, Device, HitGroup, Location, MemoryUse, RayTracingDesc,
-    RayTracingPipeline, Recorder, ResourceId, SceneSet, ShaderModule, Specialization, Stage, TlasInstances,
-    Use, pack_instance,
+    RayTracingPipeline, Recorder, ResourceId, SceneSet, Specialization, Stage, TlasInstances, Use,
+    pack_instance,
 };
 use caustica_renderer::gpu_types::{
     Frame, GEOMETRY_MOVED, GEOMETRY_SHAPES, Geometry, Instance, Push, Scene, Shape, ShapeBox, ShapeBoxJob,
 };
-use caustica_renderer::shader::{
-    Compiled, ShaderSources, Source, SpirvCache, compile, merge_interfaces, reflect,
-};
+use caustica_renderer::shader::{Compiled, ShaderSources, Source, SpirvCache, merge_interfaces};
 use caustica_tests::compute::{bytes, empty_scene};
 use caustica_tests::gpu::Session;
 use caustica_tests::shaders_under_test;
@@ -91,18 +89,15 @@ fn own(device: &Arc<Device>, file: &str, body: &str) -> Compiled {
         texts.extend(sources.load(include).expect("an include").texts);
     }
     texts.insert(file.to_owned(), format!("{HEAD}{body}"));
-    built(device, &Source { file: file.to_owned(), texts })
+    built(device, Source { file: file.to_owned(), texts })
 }
 
-fn built(device: &Arc<Device>, source: &Source) -> Compiled {
-    let words = compile(source, &SpirvCache::of_user()).expect("it compiles");
-    let interface = reflect(&source.file, &words).expect("its interface fits").interface;
-    let module = ShaderModule::new(device, &source.file, &words).expect("a module");
-    Compiled { module, interface, file: source.file.clone() }
+fn built(device: &Arc<Device>, source: Source) -> Compiled {
+    Compiled::new(device, source, &SpirvCache::of_user()).expect("it compiles and fits")
 }
 
 fn of_repository(device: &Arc<Device>, file: &str) -> Compiled {
-    built(device, &ShaderSources::new(shaders_under_test()).load(file).expect("a shader of the repository"))
+    built(device, ShaderSources::new(shaders_under_test()).load(file).expect("a shader of the repository"))
 }
 
 fn buffer(device: &Arc<Device>, size: u64, location: Location) -> Buffer {
@@ -159,7 +154,7 @@ impl Tables {
         let pass = of_repository(device, "passes/shape_boxes/shape_boxes.comp");
         let general = Specialization::default();
         let pipeline =
-            ComputePipeline::new(device, &pass.file, &pass.module, &pass.interface, &general, None)
+            ComputePipeline::new(device, pass.file(), &pass.module, &pass.interface, &general, None)
                 .expect("a pipeline");
         for (index, (part, boxes)) in parts.iter().zip(&self.boxes).enumerate() {
             let job = ShapeBoxJob {
@@ -256,7 +251,7 @@ fn pipeline(device: &Arc<Device>, set: &SceneSet) -> RayTracingPipeline {
         misses: &[&miss.module],
         hit_groups: &[shapes],
     };
-    RayTracingPipeline::new(device, &desc, &interface, &Specialization::default(), Some(set))
+    RayTracingPipeline::new(device, &desc, &interface, &Specialization::default(), Some(set.layout()))
         .expect("a pipeline")
 }
 

@@ -7,7 +7,7 @@ use ash::vk;
 use super::{Layout, Raw, ShaderModule, Specialization, with_specialization};
 use crate::Result;
 use crate::context::Device;
-use crate::descriptors::SceneSet;
+use crate::descriptors::SceneLayout;
 use crate::error::Context;
 use crate::interface::Interface;
 
@@ -27,7 +27,7 @@ impl ComputePipeline {
         module: &ShaderModule,
         interface: &Interface,
         specialization: &Specialization,
-        scene: Option<&SceneSet>,
+        scene: Option<&SceneLayout>,
     ) -> Result<Self> {
         let layout = Layout::new(device, name, scene, interface)?;
         let pipelines = with_specialization(specialization, |info| {

@@ -7,7 +7,7 @@ use ash::vk;
 use super::{Layout, Raw, ShaderModule, Specialization, with_specialization};
 use crate::Result;
 use crate::context::Device;
-use crate::descriptors::SceneSet;
+use crate::descriptors::SceneLayout;
 use crate::error::Context;
 use crate::interface::Interface;
 use crate::sbt::BindingTable;
@@ -51,7 +51,7 @@ impl RayTracingPipeline {
         desc: &RayTracingDesc<'_>,
         interface: &Interface,
         specialization: &Specialization,
-        scene: Option<&SceneSet>,
+        scene: Option<&SceneLayout>,
     ) -> Result<Self> {
         let layout = Layout::new(device, desc.name, scene, interface)?;
         let created = with_specialization(specialization, |info| create(device, desc, info, &layout));

@@ -1,0 +1,173 @@
+//! Texts of shaders that are open in the window: what was typed, what is on the disk. Enters: a folder. Leaves: saved files.
+//! A text that was not saved stays until it is saved or taken back, whatever else is opened.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use caustica_renderer::shader::{ShaderSources, ShaderStatus};
+
+/// One text.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Text {
+    now: String,
+    saved: String,
+}
+
+/// The open texts.
+#[derive(Clone, Debug, Default)]
+pub struct ShaderTexts {
+    open: BTreeMap<String, Text>,
+    /// The one that is shown.
+    pub shown: Option<String>,
+    /// Show this line next, from 1.
+    pub go_to: Option<u32>,
+    /// The text is being typed in: Ctrl+S is about it.
+    pub has_focus: bool,
+    /// How many changes of the folder were heard of when it was looked at last.
+    heard: u64,
+}
+
+impl ShaderTexts {
+    /// Shows a file, at a line.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn show(&mut self, folder: &Path, file: &str, line: Option<u32>) -> Result<(), String> {
+        if !self.open.contains_key(file) {
+            let saved = read(folder, file)?;
+            self.open.insert(file.to_owned(), Text { now: saved.clone(), saved });
+        }
+        self.shown = Some(file.to_owned());
+        self.go_to = line;
+        Ok(())
+    }
+
+    /// The text that is shown, to be typed in.
+    pub fn text_mut(&mut self) -> Option<&mut String> {
+        self.open.get_mut(self.shown.as_deref()?).map(|text| &mut text.now)
+    }
+
+    /// Whether a file was changed here and not saved.
+    pub fn is_modified(&self, file: &str) -> bool {
+        self.open.get(file).is_some_and(|text| text.now != text.saved)
+    }
+
+    /// Files that were changed here and not saved.
+    pub fn modified(&self) -> Vec<&str> {
+        self.open.keys().map(String::as_str).filter(|file| self.is_modified(file)).collect()
+    }
+
+    /// Saves the text that is shown.
+    ///
+    /// # Errors
+    /// When the file cannot be written; the text stays here.
+    pub fn save(&mut self, folder: &Path) -> Result<(), String> {
+        let Some((file, text)) = self.shown.as_ref().and_then(|file| Some((file, self.open.get_mut(file)?)))
+        else {
+            return Ok(());
+        };
+        let path = folder.join(file);
+        // Another name first: who watches the folder never sees half a file.
+        let temporary = path.with_extension("caustica-new");
+        let written = std::fs::write(&temporary, &text.now).and_then(|()| std::fs::rename(&temporary, &path));
+        written.map_err(|error| format!("{} cannot be saved: {error}", path.display()))?;
+        text.saved.clone_from(&text.now);
+        Ok(())
+    }
+
+    /// Goes back to what is on the disk.
+    pub fn revert(&mut self) {
+        if let Some(text) = self.shown.as_ref().and_then(|file| self.open.get_mut(file)) {
+            text.now.clone_from(&text.saved);
+        }
+    }
+
+    /// Whether the text that is shown differs from the one in the binary, which is there.
+    pub fn differs_from_built_in(&self) -> bool {
+        let shown = self.shown.as_ref().and_then(|file| Some((self.open.get(file)?, built_in(file)?)));
+        shown.is_some_and(|(text, built_in)| text.now != built_in)
+    }
+
+    /// Puts the text of the binary in the place of the one that is shown, and saves it.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn restore_built_in(&mut self, folder: &Path) -> Result<(), String> {
+        let Some(text) = self.shown.as_deref().and_then(built_in) else { return Ok(()) };
+        if let Some(now) = self.text_mut() {
+            *now = text;
+        }
+        self.save(folder)
+    }
+
+    /// Takes over what other programs have saved, where nothing was typed here.
+    pub fn follow(&mut self, folder: &Path, status: &ShaderStatus) {
+        let heard = status.reloads + status.refused;
+        if heard == std::mem::replace(&mut self.heard, heard) {
+            return;
+        }
+        for (file, text) in &mut self.open {
+            let Ok(saved) = read(folder, file) else { continue };
+            if text.now == text.saved {
+                text.now.clone_from(&saved);
+            }
+            text.saved = saved;
+        }
+    }
+}
+
+fn read(folder: &Path, file: &str) -> Result<String, String> {
+    ShaderSources::new(Some(folder.to_owned())).read(file).map_err(|error| error.to_string())
+}
+
+fn built_in(file: &str) -> Option<String> {
+    ShaderSources::default().read(file).ok()
+}
+
+/// Writes every shader of the binary into a folder; files that are there stay.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_built_in(folder: &Path) -> Result<(), String> {
+    for file in ShaderSources::built_in_files() {
+        let path = folder.join(&file);
+        let Some(text) = built_in(&file).filter(|_| !path.exists()) else { continue };
+        let written = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+        let written = written.and_then(|()| std::fs::write(&path, text));
+        written.map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_kept_until_it_is_saved() {
+        let folder = tempfile::tempdir().unwrap();
+        write_built_in(folder.path()).unwrap();
+        let (file, other) = ("lib/fresnel.glsl", "passes/post/post.comp");
+        let mut texts = ShaderTexts::default();
+        texts.show(folder.path(), file, Some(3)).unwrap();
+        assert!(!texts.differs_from_built_in() && texts.modified().is_empty());
+        texts.text_mut().unwrap().push_str("// mine\n");
+        texts.show(folder.path(), other, None).unwrap();
+        assert_eq!(texts.modified(), [file]);
+        // Somebody else saves: what was typed here stays, what was not touched follows.
+        let change = |file: &str| std::fs::write(folder.path().join(file), "// theirs\n").unwrap();
+        change(file);
+        change(other);
+        texts.follow(folder.path(), &ShaderStatus { reloads: 1, ..ShaderStatus::default() });
+        assert_eq!(texts.text_mut().unwrap(), "// theirs\n");
+        texts.show(folder.path(), file, None).unwrap();
+        assert!(texts.text_mut().unwrap().ends_with("// mine\n"));
+        texts.save(folder.path()).unwrap();
+        assert!(texts.modified().is_empty() && texts.differs_from_built_in());
+        assert!(read(folder.path(), file).unwrap().ends_with("// mine\n"));
+        texts.restore_built_in(folder.path()).unwrap();
+        assert_eq!(read(folder.path(), file).unwrap(), built_in(file).unwrap());
+        assert!(texts.show(folder.path(), "no/such.glsl", None).is_err());
+    }
+}

@@ -1,0 +1,81 @@
+//! Notices that something below a folder was saved. Enters: a folder. Leaves: calls, from another thread, after any change.
+//! Where the system's watcher cannot start, the folder is looked at again and again.
+
+use std::path::Path;
+use std::time::Duration;
+
+use notify::{Config, EventKind, PollWatcher, RecommendedWatcher, RecursiveMode, Watcher};
+
+/// How often a folder is looked at where the system does not tell of changes.
+const POLL: Duration = Duration::from_millis(500);
+
+/// How changes are noticed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Watching {
+    /// The system tells of them.
+    Told,
+    /// The files are looked at twice a second, for this reason.
+    Polled(String),
+    /// Not at all, for this reason.
+    Off(String),
+}
+
+/// Watches until it is dropped.
+pub(super) struct Watch {
+    how: Watching,
+    _watcher: Option<Box<dyn Watcher + Send + Sync>>,
+}
+
+impl Watch {
+    pub(super) fn start(folder: &Path, changed: impl Fn() + Clone + Send + 'static) -> Self {
+        let told = || -> notify::Result<Box<dyn Watcher + Send + Sync>> {
+            if std::env::var_os("CAUSTICA_POLL").is_some() {
+                return Err(notify::Error::generic("CAUSTICA_POLL is set"));
+            }
+            let mut watcher = RecommendedWatcher::new(handler(changed.clone()), Config::default())?;
+            watcher.watch(folder, RecursiveMode::Recursive)?;
+            Ok(Box::new(watcher))
+        };
+        let reason = match told() {
+            Ok(watcher) => return Self { how: Watching::Told, _watcher: Some(watcher) },
+            Err(error) => error.to_string(),
+        };
+        let polled = || -> notify::Result<PollWatcher> {
+            let config = Config::default().with_poll_interval(POLL).with_compare_contents(true);
+            let mut watcher = PollWatcher::new(handler(changed.clone()), config)?;
+            watcher.watch(folder, RecursiveMode::Recursive)?;
+            Ok(watcher)
+        };
+        match polled() {
+            Ok(watcher) => {
+                tracing::warn!("{}: looked at twice a second for changes: {reason}", folder.display());
+                Self { how: Watching::Polled(reason), _watcher: Some(Box::new(watcher)) }
+            }
+            Err(error) => {
+                tracing::warn!("{}: changes are not noticed: {error}", folder.display());
+                Self { how: Watching::Off(error.to_string()), _watcher: None }
+            }
+        }
+    }
+
+    pub(super) fn how(&self) -> &Watching {
+        &self.how
+    }
+}
+
+/// Passes on what may have changed a file; that a file was read does not.
+fn handler(changed: impl Fn() + Send + 'static) -> impl Fn(notify::Result<notify::Event>) + Send + 'static {
+    move |event| match event {
+        Ok(event) if matches!(event.kind, EventKind::Access(kind) if !writes(kind)) => {}
+        Ok(_) => changed(),
+        Err(error) => {
+            tracing::warn!("watching the shaders: {error}");
+            changed();
+        }
+    }
+}
+
+fn writes(kind: notify::event::AccessKind) -> bool {
+    use notify::event::{AccessKind, AccessMode};
+    matches!(kind, AccessKind::Close(AccessMode::Write))
+}

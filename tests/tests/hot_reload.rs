@@ -1,0 +1,198 @@
+//! Shaders edited while the renderer runs: every file in turn, harmlessly, with an error, with a binding that the host does not
+//! give, and back. At every step there is a picture, and it is the one that the last good shaders make.
+#![expect(clippy::expect_used, clippy::panic, reason = "a test says what is wrong by panicking")]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use caustica_renderer::shader::{ShaderFault, ShaderSources, ShaderStatus};
+use caustica_renderer::{NeedsMode, Pipeline, Primary, Show, ViewSettings};
+use caustica_tests::picture::bits;
+use caustica_tests::scene::zoo;
+use caustica_tests::shapes::{at, ball, mesh_of};
+use caustica_tests::studio::Studio;
+use caustica_tests::{scene, shader_folder};
+
+/// So long a change may take before the test gives up; nothing is measured.
+const PATIENCE: Duration = Duration::from_secs(120);
+const EXTENT: [u32; 2] = [24, 16];
+
+/// A copy of the shaders that a test may spoil.
+struct Folder(tempfile::TempDir);
+
+/// How a program saves a file.
+#[derive(Clone, Copy)]
+enum Save {
+    InPlace,
+    RenamedOver,
+    InTwoSteps,
+}
+
+impl Folder {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        copy(&shader_folder(), folder.path());
+        Self(folder)
+    }
+
+    fn path(&self, file: &str) -> PathBuf {
+        self.0.path().join(file)
+    }
+
+    fn text(&self, file: &str) -> String {
+        fs::read_to_string(self.path(file)).expect("a shader")
+    }
+
+    fn save(&self, file: &str, text: &str, how: Save) {
+        let path = self.path(file);
+        match how {
+            Save::InPlace => fs::write(&path, text),
+            Save::RenamedOver => {
+                let other = path.with_extension("new");
+                fs::write(&other, text).and_then(|()| fs::rename(&other, &path))
+            }
+            Save::InTwoSteps => {
+                let half = text.len() / 2;
+                let half = (0..=half).rev().find(|at| text.is_char_boundary(*at)).unwrap_or_default();
+                fs::write(&path, &text[..half]).and_then(|()| fs::write(&path, text))
+            }
+        }
+        .expect("a saved shader");
+    }
+}
+
+fn copy(from: &Path, to: &Path) {
+    for entry in fs::read_dir(from).expect("a folder").flatten() {
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            fs::create_dir(&target).expect("a folder");
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).expect("a copy");
+        }
+    }
+}
+
+/// Renders on until the status is as wanted.
+fn until(studio: &mut Studio, what: &str, wanted: impl Fn(&ShaderStatus) -> bool) -> ShaderStatus {
+    let start = Instant::now();
+    loop {
+        studio.frames(1);
+        let status = studio.renderer.shader_status();
+        if wanted(&status) {
+            return status;
+        }
+        assert!(start.elapsed() < PATIENCE, "{what}: {status:?}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn studio(folder: &Folder, settings: ViewSettings) -> Studio {
+    let (mut scene, camera) = zoo();
+    scene.put(mesh_of(&[ball(0.3)]), scene::lambert(0.6), at(0.2, 0.3, 0.8));
+    let mut studio = Studio::editing(folder.0.path(), EXTENT, settings);
+    studio.view_mut().set_camera(camera);
+    studio.apply(&scene.delta);
+    studio.frames(2);
+    studio
+}
+
+/// The picture after two samples from the start.
+fn picture(studio: &mut Studio) -> Vec<[u32; 3]> {
+    // Any change of the settings begins anew.
+    studio.set(|settings| settings.seed ^= 1);
+    studio.set(|settings| settings.seed ^= 1);
+    bits(&studio.mean(2))
+}
+
+/// What together uses every shader.
+fn ways() -> Vec<ViewSettings> {
+    let settings = |pipeline, primary, show, temporal| ViewSettings {
+        pipeline,
+        primary,
+        show,
+        temporal,
+        needs: NeedsMode::All,
+        ..ViewSettings::default()
+    };
+    vec![
+        settings(Pipeline::Hybrid, Primary::Raster, Show::Image, true),
+        settings(Pipeline::Hybrid, Primary::Rays, Show::Shadow, false),
+        settings(Pipeline::Raster, Primary::Raster, Show::NonFinite, false),
+        settings(Pipeline::Raster, Primary::Raster, Show::Wireframe, false),
+        settings(Pipeline::Raster, Primary::Raster, Show::Normal, false),
+        settings(Pipeline::Path, Primary::Rays, Show::Image, false),
+    ]
+}
+
+fn names(faults: &[ShaderFault]) -> BTreeSet<&str> {
+    faults.iter().map(|fault| fault.file.as_str()).collect()
+}
+
+fn edit_in_turn(folder: &Folder, studio: &mut Studio, file: &str, how: Save) {
+    let good = picture(studio);
+    let text = folder.text(file);
+    let main = studio.renderer.shader_files().contains_key(file);
+    let edit = |studio: &mut Studio, text: &str, what: &str, wanted: &dyn Fn(&ShaderStatus) -> bool| {
+        folder.save(file, text, how);
+        let status = until(studio, &format!("{file}, {what}"), wanted);
+        assert!(picture(studio) == good, "{file}, {what}: another picture");
+        status
+    };
+    let before = studio.renderer.shader_status().reloads;
+    let harmless = format!("{text}\n// harmless\n");
+    let status = edit(studio, &harmless, "harmless", &|status| status.reloads == before + 1);
+    let last = status.last.expect("a reload");
+    assert_eq!((last.files, status.faults.len()), (vec![file.to_owned()], 0));
+
+    let line = text.lines().count() as u32 + 2;
+    let wrong =
+        format!("{text}\nfloat wrong() {{ return unheard_of; }}\nfloat also() {{ return nor_this; }}\n");
+    let status = edit(studio, &wrong, "an error", &|status| !status.faults.is_empty());
+    for (word, line, column) in [("unheard_of", line, 24), ("nor_this", line + 1, 23)] {
+        let of_word = |fault: &&ShaderFault| fault.message.contains(word);
+        let fault = status.faults.iter().find(of_word).unwrap_or_else(|| panic!("{:?}", status.faults));
+        assert_eq!((fault.file.as_str(), fault.line, fault.column), (file, Some(line), Some(column)));
+        assert!(fault.source_line.as_ref().is_some_and(|line| line.contains(word)), "{fault}");
+    }
+
+    if main && text.contains("void main() {") {
+        let binding = "layout(set = 1, binding = 30, rgba16f) uniform writeonly image2D not_given;\nvoid main() {\n\
+                       imageStore(not_given, ivec2(0), vec4(0.0));\n";
+        let wrong = text.replacen("void main() {", binding, 1);
+        let is_refused =
+            |status: &ShaderStatus| status.faults.iter().any(|fault| fault.message.contains("not_given"));
+        let status = edit(studio, &wrong, "a binding", &is_refused);
+        assert_eq!(names(&status.faults), BTreeSet::from([file]));
+    }
+    let status = edit(studio, &text, "back", &|status| status.faults.is_empty() && !status.compiling);
+    assert!(status.reloads > before, "{file}");
+}
+
+/// Every file takes an hour on a processor: by default those that are included nowhere, and a few that are.
+#[test]
+fn every_shader_is_edited_in_turn_and_there_is_always_a_picture() {
+    let all = std::env::var_os("CAUSTICA_RELOAD_ALL").is_some();
+    let folder = Folder::new();
+    let included = ["lib/brdf.glsl", "shared/scene.glsl", "passes/rays/shape_hit.glsl"];
+    let mut seen: BTreeSet<String> = BTreeSet::new();
+    for (way, how) in
+        ways().into_iter().zip([Save::InPlace, Save::RenamedOver, Save::InTwoSteps].into_iter().cycle())
+    {
+        let mut studio = studio(&folder, way);
+        let files = studio.renderer.shader_files();
+        let every: BTreeSet<String> =
+            files.iter().flat_map(|(main, others)| others.iter().chain([main])).cloned().collect();
+        for file in every {
+            let wanted = all || files.contains_key(&file) || included.contains(&file.as_str());
+            if seen.insert(file.clone()) && wanted {
+                edit_in_turn(&folder, &mut studio, &file, how);
+            }
+        }
+    }
+    let unused: Vec<String> =
+        ShaderSources::built_in_files().into_iter().filter(|file| !seen.contains(file)).collect();
+    assert!(unused.iter().all(|file| file.ends_with(".md")), "no way uses {unused:?}");
+}

@@ -196,3 +196,102 @@ fn every_shader_is_edited_in_turn_and_there_is_always_a_picture() {
         ShaderSources::built_in_files().into_iter().filter(|file| !seen.contains(file)).collect();
     assert!(unused.iter().all(|file| file.ends_with(".md")), "no way uses {unused:?}");
 }
+
+/// Saves a text in which something was replaced and waits for what is wrong with it.
+fn refused(folder: &Folder, studio: &mut Studio, file: &str, what: (&str, &str)) -> String {
+    let text = folder.text(file);
+    let wrong = text.replacen(what.0, what.1, 1);
+    assert_ne!(text, wrong, "{file} has no {}", what.0);
+    let good = picture(studio);
+    folder.save(file, &wrong, Save::InPlace);
+    let status = until(studio, file, |status| !status.faults.is_empty());
+    assert!(picture(studio) == good, "{file}: another picture");
+    folder.save(file, &text, Save::InPlace);
+    until(studio, file, |status| status.faults.is_empty());
+    status.faults.iter().map(|fault| format!("{fault}\n")).collect()
+}
+
+/// What no compiler sees, as each file is right by itself.
+#[test]
+fn what_does_not_fit_the_host_or_the_other_stages_is_named() {
+    let folder = Folder::new();
+    let way = ViewSettings { needs: NeedsMode::All, ..ViewSettings::default() };
+    let mut studio = studio(&folder, way);
+    for (file, what, words) in [
+        (
+            "passes/rays/surface.rmiss",
+            (
+                "rayPayloadInEXT SurfacePayload payload;",
+                "rayPayloadInEXT uvec3 other; SurfacePayload payload;",
+            ),
+            &["surface.rmiss: ray payload: expected", "found"][..],
+        ),
+        (
+            "passes/post/post.comp",
+            ("rgba16f", "rgba32f"),
+            &["post.comp: binding 'display': expected an image of Rgba16Float, found Rgba32Float"],
+        ),
+        (
+            "passes/rays/shape.rchit",
+            ("hitAttributeEXT ", "hitAttributeEXT vec4 wide; "),
+            &["hit attribute: expected"],
+        ),
+    ] {
+        let said = refused(&folder, &mut studio, file, what);
+        assert!(words.iter().all(|word| said.contains(word)), "{file}: {said}");
+    }
+}
+
+#[test]
+fn includes_come_and_go_and_many_edits_leave_nothing_behind() {
+    let folder = Folder::new();
+    let mut studio = studio(&folder, ViewSettings { pipeline: Pipeline::Raster, ..ViewSettings::default() });
+    let (file, own) = ("passes/post/post.comp", "lib/own.glsl");
+    let text = folder.text(file);
+    let good = picture(&mut studio);
+    let reloads = |studio: &mut Studio, count: u64| until(studio, "own", |status| status.reloads == count);
+    // An include that is not there yet, then there, then another one, then none.
+    let end = text.find("void main").expect("a main function");
+    let (head, body) = text.split_at(end);
+    folder.save(file, &format!("{head}#include \"{own}\"\n{body}"), Save::RenamedOver);
+    let status = until(&mut studio, "an include", |status| !status.faults.is_empty());
+    assert!(status.faults[0].to_string().contains(own), "{:?}", status.faults);
+    folder.save(own, "float own() { return 1.0; }\n", Save::InPlace);
+    reloads(&mut studio, 1);
+    folder.save(own, "float own() { return 2.0; }\n", Save::RenamedOver);
+    let status = reloads(&mut studio, 2);
+    assert_eq!(status.last.map(|last| last.files), Some(vec![own.to_owned()]));
+    folder.save(file, &text, Save::InTwoSteps);
+    until(&mut studio, "back", |status| status.reloads >= 3 && !status.compiling && status.faults.is_empty());
+    fs::remove_file(folder.path(own)).expect("it is there");
+    assert!(picture(&mut studio) == good);
+
+    let edits: u64 = std::env::var("CAUSTICA_RELOADS").ok().and_then(|text| text.parse().ok()).unwrap_or(30);
+    let settled = |studio: &mut Studio| {
+        studio.frames(4);
+        studio.session.device.wait_idle().expect("the device");
+        (studio.session.device.memory_by_use(), resident_kib())
+    };
+    let mut before = settled(&mut studio);
+    for edit in 0..edits {
+        let start = studio.renderer.shader_status().reloads;
+        folder.save(file, &format!("{text}// {edit}\n"), Save::InPlace);
+        until(&mut studio, "one of many", |status| status.reloads > start);
+        if edit == edits / 2 {
+            before = settled(&mut studio);
+        }
+    }
+    let after = settled(&mut studio);
+    assert_eq!(after.0, before.0, "device memory");
+    // The second half: what the driver keeps of a pipeline would be more than this in each of them.
+    let grown = after.1.saturating_sub(before.1);
+    assert!(grown < 64 * edits.max(256), "{grown} KiB more after {} edits", edits / 2);
+    eprintln!("{grown} KiB more on the host after {} edits", edits / 2);
+}
+
+/// Memory of this process, KiB.
+fn resident_kib() -> u64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    line.and_then(|line| line.trim().trim_end_matches(" kB").parse().ok()).unwrap_or_default()
+}

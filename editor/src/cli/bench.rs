@@ -7,6 +7,7 @@ mod edits;
 mod hybrid;
 mod machine;
 mod moves;
+mod reload;
 mod rig;
 mod series;
 mod shapes;
@@ -44,7 +45,9 @@ struct Part {
     run: fn(&Bench) -> anyhow::Result<Measured>,
 }
 
-const SUITES: [Suite; 3] = [ACCEL, SHAPES, HYBRID];
+const SUITES: [Suite; 4] = [ACCEL, SHAPES, HYBRID, RELOAD];
+
+const RELOAD: Suite = Suite { name: "reload", parts: &[Part { name: "files", run: reload::run }] };
 
 const SHAPES: Suite = Suite { name: "shapes", parts: &[Part { name: "cloud", run: cloud::run }] };
 

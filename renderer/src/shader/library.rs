@@ -38,6 +38,11 @@ impl Compiled {
         Ok(Self { module, interface, rays: RayInterface::of(&words), source })
     }
 
+    /// Its name without the folder.
+    pub(super) fn name(&self) -> &str {
+        self.file().rsplit('/').next().unwrap_or_default()
+    }
+
     /// Main file.
     pub fn file(&self) -> &str {
         &self.source.file

@@ -8,6 +8,8 @@ use super::twins::text_of;
 use crate::error::{RendererError, Result};
 
 const HEADER_WORDS: usize = 5;
+/// The attribute of a hit on a triangle (VK_KHR_ray_tracing_pipeline).
+const BARYCENTRIC: &str = "float32x2";
 const RAY_PAYLOAD: u32 = 5338;
 const HIT_ATTRIBUTE: u32 = 5339;
 const INCOMING_RAY_PAYLOAD: u32 = 5342;
@@ -85,32 +87,28 @@ pub(crate) fn check_payloads(generation: &Compiled, others: &[&Compiled]) -> Res
     let refuse = |stage: &Compiled, reason: String| {
         Err(RendererError::Interface { file: stage.file().to_owned(), reason })
     };
-    let mut kinds: BTreeMap<bool, (&str, &String)> = BTreeMap::new();
-    for stage in others {
-        let Some((name, found)) = &stage.rays.received else { continue };
-        let sent = generation.rays.sent.get(name).map(|ty| (generation.file(), ty));
-        // The stages of one kind of ray agree, also where the generation names another struct.
-        let is_shadow = stage.file().rsplit('/').next().is_some_and(|file| file.starts_with("shadow"));
-        let (from, expected) =
-            sent.unwrap_or_else(|| *kinds.entry(is_shadow).or_insert((stage.file(), found)));
-        if expected != found {
+    let is_shadow = |stage: &Compiled| stage.name().starts_with("shadow");
+    for shadow in [false, true] {
+        let of_kind = || others.iter().filter(|stage| is_shadow(stage) == shadow);
+        let received = || of_kind().filter_map(|stage| Some((*stage, stage.rays.received.as_ref()?)));
+        let sent = received().find_map(|(_, (name, _))| generation.rays.sent.get(name));
+        let first = || received().next().map(|(stage, (_, ty))| (stage.file(), ty));
+        let Some((from, expected)) = sent.map(|ty| (generation.file(), ty)).or_else(first) else { continue };
+        if let Some((stage, (_, found))) = received().find(|(_, (_, found))| found != expected) {
             return refuse(stage, format!("ray payload: expected {expected}, as in {from}, found {found}"));
         }
-        kinds.entry(is_shadow).or_insert((from, expected));
     }
+    // Shapes hand over what their intersection shader writes, if anything.
     let given = others.iter().find(|stage| stage.file().ends_with(".rint"));
-    let Some((from, expected)) = given.and_then(|stage| Some((stage, stage.rays.attribute.as_ref()?))) else {
-        return Ok(());
-    };
     for stage in others {
-        // Triangles have two floats, which stages of their own read.
-        let shapes = stage.file().rsplit('/').next().is_some_and(|name| name.starts_with("shape"));
-        if let Some(found) = stage.rays.attribute.as_ref().filter(|found| shapes && *found != expected) {
-            let from = from.file();
-            return refuse(
-                stage,
-                format!("hit attribute: expected {expected}, which {from} writes, found {found}"),
-            );
+        let of_shapes = stage.name().starts_with("shape");
+        let expected = match given.and_then(|given| given.rays.attribute.as_deref()) {
+            Some(attribute) if of_shapes => attribute,
+            None if of_shapes => continue,
+            _ => BARYCENTRIC,
+        };
+        if let Some(found) = stage.rays.attribute.as_ref().filter(|found| *found != expected) {
+            return refuse(stage, format!("hit attribute: expected {expected}, found {found}"));
         }
     }
     Ok(())

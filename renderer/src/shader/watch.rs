@@ -29,20 +29,21 @@ pub(super) struct Watch {
 impl Watch {
     pub(super) fn start(folder: &Path, changed: impl Fn() + Clone + Send + 'static) -> Self {
         let told = || -> notify::Result<Box<dyn Watcher + Send + Sync>> {
-            if std::env::var_os("CAUSTICA_POLL").is_some() {
-                return Err(notify::Error::generic("CAUSTICA_POLL is set"));
-            }
             let mut watcher = RecommendedWatcher::new(handler(changed.clone()), Config::default())?;
             watcher.watch(folder, RecursiveMode::Recursive)?;
             Ok(Box::new(watcher))
         };
-        let reason = match told() {
-            Ok(watcher) => return Self { how: Watching::Told, _watcher: Some(watcher) },
-            Err(error) => error.to_string(),
-        };
+        match told() {
+            Ok(watcher) => Self { how: Watching::Told, _watcher: Some(watcher) },
+            Err(error) => Self::polled(folder, changed, error.to_string()),
+        }
+    }
+
+    /// `reason`: why the system does not tell.
+    fn polled(folder: &Path, changed: impl Fn() + Send + 'static, reason: String) -> Self {
         let polled = || -> notify::Result<PollWatcher> {
             let config = Config::default().with_poll_interval(POLL).with_compare_contents(true);
-            let mut watcher = PollWatcher::new(handler(changed.clone()), config)?;
+            let mut watcher = PollWatcher::new(handler(changed), config)?;
             watcher.watch(folder, RecursiveMode::Recursive)?;
             Ok(watcher)
         };
@@ -78,4 +79,35 @@ fn handler(changed: impl Fn() + Send + 'static) -> impl Fn(notify::Result<notify
 fn writes(kind: notify::event::AccessKind) -> bool {
     use notify::event::{AccessKind, AccessMode};
     matches!(kind, AccessKind::Close(AccessMode::Write))
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+
+    #[test]
+    fn changes_are_noticed_told_or_polled_and_reading_is_none() {
+        let patience = Duration::from_secs(60);
+        for polled in [false, true] {
+            let folder = std::env::temp_dir().join(format!("caustica-watch-{}-{polled}", std::process::id()));
+            std::fs::create_dir_all(folder.join("lib")).unwrap();
+            let file = folder.join("lib/a.glsl");
+            std::fs::write(&file, "1").unwrap();
+            let (sender, changes) = channel();
+            let changed = move || drop(sender.send(()).ok());
+            let watch = match polled {
+                true => Watch::polled(&folder, changed, "no more of them".to_owned()),
+                false => Watch::start(&folder, changed),
+            };
+            assert_eq!(matches!(watch.how(), Watching::Polled(_)), polled);
+            std::fs::read(&file).unwrap();
+            assert!(changes.recv_timeout(POLL * 2).is_err(), "nothing was written");
+            std::fs::write(&file, "2").unwrap();
+            changes.recv_timeout(patience).unwrap();
+            std::fs::remove_dir_all(&folder).unwrap();
+        }
+    }
 }

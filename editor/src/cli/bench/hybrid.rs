@@ -29,7 +29,7 @@ const PROJECT: &str = "projects/gallery/gallery.caustica.json";
 pub(super) struct HybridArgs {
     /// Project or model that is rendered
     #[arg(long, value_name = "FILE", default_value = PROJECT)]
-    project: PathBuf,
+    pub(super) project: PathBuf,
     /// Columns and rows (default: 1280x720, with a processor as the device 320x180)
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,

@@ -126,7 +126,7 @@ impl Audit<'_> {
             self.add(Severity::Error, Subject::Prefab(id), &prefab.name, message);
         }
         for (id, node) in self.document.nodes() {
-            let NodeKind::Prefab { prefab, overrides, clip, variant } = &node.kind else {
+            let NodeKind::Prefab { prefab, overrides, clip, variant, scene } = &node.kind else {
                 continue;
             };
             let Some(prefab) = self.document.prefab(*prefab).filter(|p| !p.missing) else {
@@ -141,9 +141,16 @@ impl Audit<'_> {
                 );
                 self.add(Severity::Warning, Subject::Target(Target::node(id)), &node.name, message);
             }
-            if let Some(name) = variant.as_ref().filter(|name| !prefab.variants().contains(name)) {
+            let lost = |choice: &Option<String>, known: Vec<String>| {
+                choice.as_ref().filter(|name| !known.contains(name)).cloned()
+            };
+            for (lost, is_to) in [
+                (lost(variant, prefab.variants()), "be shown in"),
+                (lost(scene, prefab.scene_names()), "show the scene"),
+            ] {
+                let Some(name) = lost else { continue };
                 let message =
-                    format!("it is to be shown in {name}, which the source does not have; choose another");
+                    format!("it is to {is_to} {name}, which the source does not have; choose another");
                 self.add(Severity::Warning, Subject::Target(Target::node(id)), &node.name, message);
             }
             let lost = overrides.keys().filter(|path| prefab.part_at(path).is_none());

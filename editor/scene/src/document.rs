@@ -97,6 +97,14 @@ struct PartStates {
     varied: BTreeMap<(MeshId, u32), MaterialId>,
     /// What the time that is shown lays over them; instances in the same pose share it.
     pose: Arc<Pose>,
+    /// Which parts the scene that is shown does not have; empty where it has all.
+    absent: Vec<bool>,
+}
+
+impl PartStates {
+    fn is_absent(&self, part: u32) -> bool {
+        self.absent.get(part as usize).copied().unwrap_or(false)
+    }
 }
 
 impl Default for Document {
@@ -247,11 +255,11 @@ impl Document {
         self.default_camera
     }
 
-    /// Whether the node, or the part inside its instance, is in the document.
+    /// Whether the node, or the part inside its instance, is in the document, and in the scene that the instance shows.
     pub fn contains(&self, target: Target) -> bool {
         match target.part {
             None => self.slots.contains_key(&target.node),
-            Some(_) => self.part(target).is_some(),
+            Some(_) => self.part(target).is_some() && !self.is_absent(target),
         }
     }
 
@@ -345,7 +353,8 @@ impl Document {
         let parts = prefab
             .into_iter()
             .flat_map(|prefab| prefab.children(target.part))
-            .map(|part| Target::part(target.node, part));
+            .map(|part| Target::part(target.node, part))
+            .filter(|&part| !self.is_absent(part));
         let nodes = match target.part {
             None => node.children.as_slice(),
             Some(_) => &[],
@@ -402,6 +411,7 @@ impl Document {
     /// What a target brings into the picture.
     pub fn content_of(&self, target: Target) -> Content {
         match target.part {
+            Some(_) if self.is_absent(target) => Content::default(),
             Some(_) => self.part(target).map(part_content).unwrap_or_default(),
             None => self.node(target.node).map(|node| node_content(&node.kind)).unwrap_or_default(),
         }

@@ -75,6 +75,13 @@ pub enum Edit {
         /// Its name in [`crate::Prefab::variants`]; `None`: the materials that the meshes have.
         variant: Option<String>,
     },
+    /// Chooses the scene of its source that an instance shows.
+    SetScene {
+        /// The instance.
+        node: NodeId,
+        /// Its name in [`crate::Prefab::scene_names`]; `None`: the one that the source shows by itself.
+        scene: Option<String>,
+    },
     /// Lets an instance show another prefab. Overrides stay, by path.
     SetPrefab {
         /// The instance.
@@ -273,6 +280,9 @@ pub enum EditError {
     /// The prefab has no such variant of materials.
     #[error("there is no variant {0}")]
     NoVariant(String),
+    /// The source has no such scene.
+    #[error("there is no scene {0}")]
+    NoScene(String),
     /// No other instance shows the prefab.
     #[error("it is the only instance already")]
     OnlyInstance,
@@ -350,6 +360,10 @@ impl Edit {
             Self::SetVariant { node, variant } => {
                 let variant = variant.as_deref().unwrap_or("its own materials");
                 format!("showed {} in {variant}", name(&Target::node(*node)))
+            }
+            Self::SetScene { node, scene } => {
+                let scene = scene.as_deref().unwrap_or("its own scene");
+                format!("showed {scene} of {}", name(&Target::node(*node)))
             }
             Self::SetPrefab { node, .. } => format!("gave {} another source", name(&Target::node(*node))),
             Self::ResetOverride { target, .. } => format!("reset {}", name(target)),

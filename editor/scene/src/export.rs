@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::assets::{Environment, ShapeSource};
 use crate::document::Document;
-use crate::ids::{MaterialId, MeshId};
+use crate::ids::{MaterialId, MeshId, NodeId};
 use crate::import::Warning;
 
 mod animation;
@@ -21,16 +21,19 @@ mod json;
 mod material;
 mod mesh;
 mod node;
+mod pointer;
+mod scene;
 mod shapes;
 mod texture;
 mod tree;
 
 use buffer::Buffer;
 use foreign::Sources;
-use json::{Extensions, Object, Pool, Put};
+use json::{Extensions, Object, Put};
 use material::MaterialWriter;
 use mesh::{MeshKey, MeshWriter, Meshes};
-use node::NodeWriter;
+use node::{Carried, NodeWriter};
+use pointer::Places;
 use texture::Textures;
 use tree::Tree;
 
@@ -179,47 +182,71 @@ impl<'a> Writer<'a> {
         for reason in std::mem::take(&mut sources.warnings) {
             self.warn("", reason);
         }
-        let keys: BTreeSet<&MeshKey> = tree.entries.iter().filter_map(|entry| entry.mesh.as_ref()).collect();
+        let unplaced = self.unplaced(&tree, &meshes);
+        let placed = tree.entries.iter().filter_map(|entry| entry.mesh.as_ref());
+        let keys: BTreeSet<&MeshKey> = placed.chain(&unplaced).collect();
         let materials: BTreeSet<MaterialId> =
             keys.iter().flat_map(|key| used_materials(key)).chain(sources.materials()).collect();
         let materials: BTreeMap<MaterialId, usize> = materials.into_iter().zip(0..).collect();
         progress("writing materials", 0.1);
-        let (material_list, textures) = self.materials(&materials, &sources);
+        let (mut material_list, textures) = self.materials(&materials, &sources);
         progress("writing meshes", 0.3);
         let mesh_list = self.meshes(&keys, &meshes, &materials, &sources);
         progress("writing nodes", 0.6);
         let places: BTreeMap<MeshKey, usize> = keys.iter().map(|key| (*key).clone()).zip(0..).collect();
-        let nodes = self.nodes(&tree, &sources, &places);
-        let skins = animation::skins(self.document, &tree, &mut self.buffer);
-        let clips = animation::clips(self.document, &tree, &mut self.buffer);
+        let skin_places = animation::skin_places(self.document, &tree);
+        let mut nodes = self.nodes(&tree, &sources, &places, &skin_places);
+        let skins = animation::skins(&skin_places, &tree, &sources, &mut self.buffer, &mut self.used);
+        let mut of_mesh: BTreeMap<MeshId, Vec<usize>> = BTreeMap::new();
+        for (key, place) in &places {
+            of_mesh.entry(key.mesh).or_default().push(*place);
+        }
+        let (lights, cameras) = (&nodes.lights, &nodes.cameras);
+        let everything = Places {
+            tree: &tree,
+            sources: &sources,
+            lights,
+            cameras,
+            materials: &materials,
+            meshes: &of_mesh,
+        };
+        let clips = animation::clips(&everything, &mut self.buffer, &mut self.used);
+        pointer::complete(&clips.pointers, &mut nodes.list, &mut material_list, &mut self.used);
         progress("writing images", 0.7);
         let textures = textures.finish(&mut self.buffer);
         self.exported.nodes = nodes.list.len();
         (self.exported.meshes, self.exported.materials) = (mesh_list.len(), material_list.len());
         self.warn_about_the_rest(&tree, &meshes);
+        self.warn_about_clips(&tree, clips.left_out);
 
         let lists = std::mem::take(&mut self.buffer).finish();
         let mut file = Object::new();
         file.put("asset", self.asset(&sources));
-        file.put("scene", 0);
-        file.put("scenes", vec![Value::Object(self.scene(&tree, &sources))]);
-        sources.put_file(&mut file, &mut self.used);
-        if !nodes.lights.is_empty() {
-            let mut lights = Object::new();
-            lights.put("lights", nodes.lights);
-            self.used.put(&mut file, "KHR_lights_punctual", lights);
+        let (shown, scenes) = self.scenes(&tree, &sources);
+        file.put("scene", shown);
+        file.put("scenes", scenes);
+        let mut lights = nodes.lights.pool.into_list();
+        lights.extend(sources.spare(|foreign| &foreign.spare_lights, &mut self.used));
+        let mut cameras = nodes.cameras.pool.into_list();
+        cameras.extend(sources.spare(|foreign| &foreign.spare_cameras, &mut self.used));
+        if !lights.is_empty() {
+            let mut object = Object::new();
+            object.put("lights", lights);
+            self.used.put(&mut file, "KHR_lights_punctual", object);
         }
+        sources.put_file(&mut file, &mut self.used);
+        self.warn_about_lost(&sources);
         file.put_filled("extensionsUsed", self.used.names());
         for (name, list) in [
             ("nodes", nodes.list),
-            ("cameras", nodes.cameras),
+            ("cameras", cameras),
             ("meshes", mesh_list),
             ("materials", material_list),
             ("textures", textures.textures),
             ("images", textures.images),
             ("samplers", textures.samplers),
             ("skins", skins),
-            ("animations", clips),
+            ("animations", clips.list),
             ("accessors", lists.accessors),
             ("bufferViews", lists.views),
         ] {
@@ -237,7 +264,7 @@ impl<'a> Writer<'a> {
         let mut list = Vec::with_capacity(places.len());
         for &id in places.keys() {
             let Some(material) = self.document.material(id) else { continue };
-            let mut writer = MaterialWriter { textures: &mut textures, used: &mut self.used };
+            let mut writer = MaterialWriter { textures: &mut textures, used: &mut self.used, sources };
             let (mut object, extras) = writer.write(material);
             sources.put(&mut object, sources.material(id), extras, &mut self.used);
             list.push(Value::Object(object));
@@ -267,8 +294,13 @@ impl<'a> Writer<'a> {
         list
     }
 
-    fn nodes(&mut self, tree: &Tree, sources: &Sources<'_>, meshes: &BTreeMap<MeshKey, usize>) -> Nodes {
-        let skins = animation::first_skins(self.document, tree);
+    fn nodes(
+        &mut self,
+        tree: &Tree,
+        sources: &Sources<'_>,
+        meshes: &BTreeMap<MeshKey, usize>,
+        skins: &BTreeMap<(NodeId, u32), usize>,
+    ) -> Nodes {
         let moving = animation::moving(self.document, tree);
         let mut writer = NodeWriter {
             document: self.document,
@@ -276,14 +308,14 @@ impl<'a> Writer<'a> {
             buffer: &mut self.buffer,
             used: &mut self.used,
             meshes,
-            skins: &skins,
+            skins,
             moving: &moving,
-            lights: Pool::default(),
-            cameras: Pool::default(),
+            lights: Carried::default(),
+            cameras: Carried::default(),
             warnings: Vec::new(),
         };
         let list = writer.write(tree);
-        let (lights, cameras) = (writer.lights.into_list(), writer.cameras.into_list());
+        let (lights, cameras) = (writer.lights, writer.cameras);
         for (name, reason) in writer.warnings {
             self.warn(&format!("node \"{name}\""), reason);
         }
@@ -296,31 +328,6 @@ impl<'a> Writer<'a> {
         asset.put("generator", concat!("Caustica ", env!("CARGO_PKG_VERSION")));
         sources.put_asset(&mut asset, &mut self.used);
         asset
-    }
-
-    fn scene(&mut self, tree: &Tree, sources: &Sources<'_>) -> Object {
-        let mut scene = Object::new();
-        scene.put_filled("nodes", tree.roots.clone());
-        let mut extras = Object::new();
-        let asked =
-            tree.prefabs().into_iter().filter_map(|id| self.document.prefab(id)?.environment.as_ref());
-        let environment = match self.document.environment() {
-            Environment::Auto => asked.into_iter().next(),
-            set => Some(set),
-        };
-        match environment {
-            Some(Environment::Constant(radiance)) => {
-                let mut environment = Object::new();
-                environment.put("constantRadiance", json::numbers(&radiance.to_array()));
-                extras.put("environment", environment);
-            }
-            Some(Environment::DefaultSky | Environment::File(_)) => {
-                self.warn("environment", "only a constant one is written, glTF has no word for others");
-            }
-            Some(Environment::Auto) | None => {}
-        }
-        sources.put_scene(&mut scene, extras, &mut self.used);
-        scene
     }
 
     /// What the file cannot say as a whole.
@@ -342,20 +349,50 @@ impl<'a> Writer<'a> {
                 self.warn(&place, "it is missing, so that its instances are empty nodes");
             }
         }
-        if animation::plays_otherwise(self.document, tree) {
-            self.warn("animations", "which clips are played is left out: all are written, in order");
-        }
-        match animation::left_out(self.document, tree) {
-            0 => {}
-            count => self.warn(
-                "animations",
-                format!("{count} channels of visibility, lights, cameras and materials are left out"),
-            ),
-        }
         let first = self.document.cameras().map(|camera| camera.target).min_by_key(|t| tree.places.get(t));
         if self.document.default_camera().is_some_and(|chosen| Some(chosen) != first) {
             self.warn("cameras", "which of them renders is left out: a reader takes the first");
         }
+    }
+
+    fn warn_about_clips(&mut self, tree: &Tree, left_out: usize) {
+        if animation::plays_otherwise(self.document, tree) {
+            self.warn("animations", "which clips are played is left out: all are written, in order");
+        }
+        if left_out > 0 {
+            let reason =
+                format!("{left_out} channels are left out, as they change nothing that is in the file");
+            self.warn("animations", reason);
+        }
+    }
+
+    /// What the sources say that has no place in the file.
+    fn warn_about_lost(&mut self, sources: &Sources<'_>) {
+        for (prefab, what, count) in sources.lost() {
+            let times = if count == 1 { String::new() } else { format!(" ({count} times)") };
+            self.warn(
+                &format!("source \"{}\"", prefab.source.display()),
+                format!("{what} is left out{times}"),
+            );
+        }
+        if self.used.homeless > 0 {
+            let count = self.used.homeless;
+            let reason = format!("{count} extras or extensions are left out with the objects that have them");
+            self.warn("sources", reason);
+        }
+    }
+
+    /// Meshes of placed sources that none of their parts places.
+    fn unplaced(&self, tree: &Tree, meshes: &Meshes<'_>) -> Vec<MeshKey> {
+        let mut keys = Vec::new();
+        for prefab in tree.prefabs().into_iter().filter_map(|id| self.document.prefab(id)) {
+            let mut placed: BTreeSet<MeshId> = prefab.nodes().iter().filter_map(|node| node.mesh).collect();
+            let loose = prefab.foreign.loose_parts.values();
+            placed.extend(loose.filter_map(|place| prefab.meshes.get(*place)));
+            let rest = prefab.meshes.iter().filter(|mesh| !placed.contains(mesh));
+            keys.extend(rest.filter_map(|mesh| tree::unplaced(meshes, *mesh)));
+        }
+        keys
     }
 
     fn warn(&mut self, place: &str, message: impl Into<String>) {
@@ -367,8 +404,8 @@ impl<'a> Writer<'a> {
 /// Lists that come from walking the nodes.
 struct Nodes {
     list: Vec<Value>,
-    lights: Vec<Value>,
-    cameras: Vec<Value>,
+    lights: Carried,
+    cameras: Carried,
 }
 
 /// The materials of the primitives that a mesh of the file has.

@@ -34,7 +34,7 @@ pub use export::{ExportError, ExportFormat, Exported, export, export_with_progre
 pub use ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
 pub use node::{Node, NodeKind, RayVisibility, Subtree};
 pub use package::{MaterialEntry, PrefabPackage};
-pub use prefab::{PartNode, PartOrderError, PartOverride, PartPath, Prefab, Skin};
+pub use prefab::{PartNode, PartOrderError, PartOverride, PartPath, Prefab, Skin, SourceScene};
 pub use project::{
     Fingerprint, HeldJournal, Journal, JournalError, LeftBehind, Project, ProjectError, ProjectMeta,
     ProjectProblem, Recovered, RecoveredStep, SCHEMA_VERSION, keep_if_changed,

@@ -66,6 +66,9 @@ pub enum NodeKind {
         /// The variant of materials that it shows, by name; `None`: those of the meshes. A name that the source no longer
         /// has is kept.
         variant: Option<String>,
+        /// The scene of the source that it shows, by name; `None`: the one that the source shows by itself. A name that the
+        /// source no longer has is kept.
+        scene: Option<String>,
     },
     /// Places a mesh.
     Mesh {
@@ -85,7 +88,8 @@ pub enum NodeKind {
 impl NodeKind {
     /// An instance of a prefab that follows it in everything.
     pub fn instance_of(prefab: PrefabId) -> Self {
-        Self::Prefab { prefab, overrides: BTreeMap::new(), clip: ClipChoice::default(), variant: None }
+        let (overrides, clip) = Default::default();
+        Self::Prefab { prefab, overrides, clip, variant: None, scene: None }
     }
 }
 

@@ -9,15 +9,18 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
 use crate::animation::{Animation, Channel, ChannelPath};
 use crate::assets::{Camera, Environment, Light};
-use crate::foreign::{Foreign, Mapping};
+use crate::foreign::Foreign;
 use crate::ids::{MaterialId, MeshId, TextureId};
 use crate::node::RayVisibility;
 use crate::package::AssetNames;
 use crate::transform::Local;
+
+mod scenes;
+
+pub use scenes::SourceScene;
 
 /// One node of an imported file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -114,7 +117,7 @@ pub struct Prefab {
     pub materials: Vec<MaterialId>,
     /// Its textures in the order of import.
     pub textures: Vec<TextureId>,
-    /// The environment that the file asks for.
+    /// The environment that the file asks for, in the scene that is shown where none is chosen.
     pub environment: Option<Environment>,
     /// True: the file could not be read; the prefab stands for it so that nothing is lost on save.
     pub missing: bool,
@@ -124,6 +127,8 @@ pub struct Prefab {
     pub(crate) foreign: Arc<Foreign>,
     /// Names of its assets in its file.
     pub(crate) asset_names: Arc<AssetNames>,
+    scenes: Vec<SourceScene>,
+    default_scene: usize,
     nodes: Vec<PartNode>,
     subtree_end: Vec<u32>,
     segments: Vec<String>,
@@ -215,28 +220,6 @@ impl Prefab {
     /// Whether anything in it can move by itself.
     pub fn is_animated(&self) -> bool {
         self.animations.iter().any(|clip| !clip.channels.is_empty())
-    }
-
-    /// Names of its variants of materials (KHR_materials_variants) in the order of the file; the n-th without a name is
-    /// `variant n`.
-    pub fn variants(&self) -> Vec<String> {
-        let name = |(place, value): (usize, &Value)| match value.get("name").and_then(Value::as_str) {
-            Some(name) if !name.is_empty() => name.to_owned(),
-            _ => format!("variant {}", place + 1),
-        };
-        self.foreign.variants.iter().enumerate().map(name).collect()
-    }
-
-    /// The materials that a variant chooses, by mesh and primitive; the others keep that of the mesh.
-    pub(crate) fn variant_materials(&self, name: &str) -> BTreeMap<(MeshId, u32), MaterialId> {
-        let Some(variant) = self.variants().iter().position(|known| known == name) else {
-            return BTreeMap::new();
-        };
-        let chosen = |(&(mesh, primitive), mappings): (&(usize, usize), &Vec<Mapping>)| {
-            let mapping = mappings.iter().find(|mapping| mapping.variants.contains(&variant))?;
-            Some(((*self.meshes.get(mesh)?, primitive as u32), *self.materials.get(mapping.material)?))
-        };
-        self.foreign.mappings.iter().filter_map(chosen).collect()
     }
 
     /// Puts other ids in place of the materials that clips change.

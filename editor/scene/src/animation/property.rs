@@ -41,6 +41,11 @@ impl Property {
         u16::try_from(place).ok().map(Self)
     }
 
+    /// What its pointer says behind the thing.
+    pub(crate) fn pointer<T: Animated>(self) -> &'static str {
+        self.row::<T>().map_or("", |row| row.pointer)
+    }
+
     fn row<T: Animated>(self) -> Option<&'static Row<T>> {
         T::PROPERTIES.get(usize::from(self.0))
     }

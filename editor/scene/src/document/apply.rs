@@ -47,6 +47,7 @@ impl Document {
             Edit::SetClip { node, clip } => self.set_clip(node, clip),
             Edit::SetLocked { node, locked } => self.set_locked(node, locked),
             Edit::SetVariant { node, variant } => self.set_variant(node, variant),
+            Edit::SetScene { node, scene } => self.set_scene(node, scene),
             Edit::SetPrefab { node, prefab } => self.set_prefab(node, prefab),
             Edit::ResetOverride { target, field } => self.reset_override(target, field),
             Edit::AssignMaterial { target, primitive, material } => {
@@ -404,6 +405,9 @@ impl Document {
     }
 
     pub(super) fn report_changed(&mut self, target: Target) {
+        if !self.contains(target) {
+            return;
+        }
         let content = Content { mesh: true, ..self.content_of(target) };
         self.changes.target_changed(target, content);
         self.note_shine(target);

@@ -1,4 +1,4 @@
-//! Carries out edits of instances: the prefab that they show, and the variant of its materials.
+//! Carries out edits of instances: the prefab that they show, its scene, and the variant of its materials.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,6 +14,35 @@ impl Document {
             NodeKind::Prefab { variant, .. } => variant.as_deref(),
             _ => None,
         }
+    }
+
+    /// The scene of its source that an instance is to show; `None`: the one that the source shows by itself.
+    pub fn scene_of(&self, node: NodeId) -> Option<&str> {
+        match &self.node(node)?.kind {
+            NodeKind::Prefab { scene, .. } => scene.as_deref(),
+            _ => None,
+        }
+    }
+
+    /// Whether the scene that an instance shows does not have a part.
+    pub(crate) fn is_absent(&self, target: Target) -> bool {
+        self.slots.get(&target.node).zip(target.part).is_some_and(|(slot, part)| slot.parts.is_absent(part))
+    }
+
+    pub(super) fn set_scene(&mut self, node: NodeId, scene: Option<String>) -> Result<Edit, EditError> {
+        let prefab = self.require_instance(node)?;
+        let known = self.prefab(prefab).map(|prefab| prefab.scene_names()).unwrap_or_default();
+        if let Some(name) = scene.as_ref().filter(|name| !known.contains(name) && !self.restoring) {
+            return Err(EditError::NoScene(name.clone()));
+        }
+        self.report_removed(node);
+        let mut old = None;
+        if let NodeKind::Prefab { scene: shown, .. } = &mut self.node_mut(Target::node(node))?.kind {
+            old = std::mem::replace(shown, scene);
+        }
+        self.state_parts(node);
+        self.changes.structure = true;
+        Ok(Edit::SetScene { node, scene: old })
     }
 
     pub(super) fn set_prefab(&mut self, node: NodeId, prefab: PrefabId) -> Result<Edit, EditError> {

@@ -215,7 +215,7 @@ impl Document {
 
     /// The derived state of an instance, before its transforms are computed.
     pub(super) fn part_states(&self, node: &Node) -> PartStates {
-        let NodeKind::Prefab { prefab, overrides, .. } = &node.kind else {
+        let NodeKind::Prefab { prefab, overrides, scene, .. } = &node.kind else {
             return PartStates::default();
         };
         let Some(prefab) = self.prefabs.get(prefab) else {
@@ -231,6 +231,7 @@ impl Document {
                 .collect(),
             varied: self.varied_materials(node),
             pose: self.pose_of(node),
+            absent: prefab.absent_in(scene.as_deref()),
         }
     }
 }

@@ -24,9 +24,10 @@ impl Document {
             | Edit::AssignMaterial { target, .. }
             | Edit::SetLight { target, .. }
             | Edit::SetCamera { target, .. } => self.locked_by(*target),
-            Edit::SetClip { node, .. } | Edit::SetVariant { node, .. } | Edit::SetPrefab { node, .. } => {
-                self.locked_by((*node).into())
-            }
+            Edit::SetClip { node, .. }
+            | Edit::SetVariant { node, .. }
+            | Edit::SetScene { node, .. }
+            | Edit::SetPrefab { node, .. } => self.locked_by((*node).into()),
             Edit::AddNode { parent, .. } => parent.and_then(|parent| self.locked_by(parent.into())),
             Edit::Reparent { node, parent, .. } => {
                 let above = parent.and_then(|parent| self.locked_by(parent.into()));

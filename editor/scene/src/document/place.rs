@@ -47,7 +47,7 @@ pub struct Placed<T> {
 impl Document {
     /// One placed mesh.
     pub fn renderable(&self, target: Target) -> Option<Renderable> {
-        let id = self.mesh_of(target)?;
+        let id = self.mesh_of(target).filter(|_| !self.is_absent(target))?;
         let mesh = self.mesh(id)?;
         let rays = self.ray_visibility(target)?;
         Some(Renderable {
@@ -133,6 +133,7 @@ impl Document {
     }
 
     fn placed<T>(&self, target: Target, value: T) -> Option<Placed<T>> {
+        (!self.is_absent(target)).then_some(())?;
         Some(Placed {
             target,
             value,
@@ -198,5 +199,6 @@ impl Document {
             .flat_map(|prefab| prefab.nodes().iter().enumerate())
             .filter(move |(_, part)| wanted(part_content(part)))
             .map(move |(index, _)| Target::part(id, index as u32))
+            .filter(|&target| !self.is_absent(target))
     }
 }

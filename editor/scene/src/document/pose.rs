@@ -300,11 +300,12 @@ impl Document {
                 differs = true;
             }
         }
-        for part in differing(&old.lights, &pose.lights) {
+        let present = |part: &u32| !slot.parts.is_absent(*part);
+        for part in differing(&old.lights, &pose.lights).into_iter().filter(present) {
             self.changes.lights.insert(Target::part(node, part));
             differs = true;
         }
-        for part in differing(&old.cameras, &pose.cameras) {
+        for part in differing(&old.cameras, &pose.cameras).into_iter().filter(present) {
             self.changes.cameras.insert(Target::part(node, part));
             differs = true;
         }
@@ -313,7 +314,7 @@ impl Document {
             differs = true;
         }
         let parts = &slot.parts;
-        for index in differing(&old.weights, &pose.weights) {
+        for index in differing(&old.weights, &pose.weights).into_iter().filter(present) {
             let part = prefab.node(index);
             let mesh = part.and_then(|part| self.meshes.get(&part.mesh?));
             let (Some(part), Some(mesh)) = (part, mesh) else {

@@ -219,10 +219,11 @@ fn update_parts(
             continue;
         };
         let target = Target::part(id, index);
-        let content = part_content(part);
+        let absent = slot.parts.is_absent(index);
+        let content = if absent { Content::default() } else { part_content(part) };
         let local = slot.parts.posed_local(index, part).to_affine();
         let parts = &mut slot.parts;
-        let visible = parts.posed_visible(index, part);
+        let visible = !absent && parts.posed_visible(index, part);
         let above = part.parent.map(|parent| parent as usize);
         let world = above.and_then(|p| parts.worlds.get(p).copied()).unwrap_or(slot.world) * local;
         let shown = above.and_then(|p| parts.shown.get(p).copied()).unwrap_or(slot.shown) && visible;
@@ -230,7 +231,7 @@ fn update_parts(
         let moved_content = match prefab.skin_of(index) {
             // A skinned mesh goes with its instance, not with its part.
             Some(_) => Content {
-                mesh: moved,
+                mesh: moved && !absent,
                 light: content.light && part_moved,
                 camera: content.camera && part_moved,
             },
@@ -249,7 +250,7 @@ fn update_parts(
             bent.extend(prefab.bent_by(index));
         }
     }
-    for part in bent {
+    for part in bent.into_iter().filter(|part| !slot.parts.is_absent(*part)) {
         changes.target_bent(Target::part(id, part));
     }
     run

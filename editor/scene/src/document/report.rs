@@ -91,10 +91,13 @@ impl Document {
 /// A node and the parts of its instance, with what they bring.
 fn contents<'a>(
     id: NodeId,
-    slot: &Slot,
+    slot: &'a Slot,
     prefab: Option<&'a Prefab>,
-) -> impl Iterator<Item = (Target, Content)> + use<'a> {
+) -> impl Iterator<Item = (Target, Content)> + 'a {
     let own = (Target::node(id), node_content(&slot.node.kind));
-    let parts = prefab.into_iter().flat_map(|prefab| (0..).zip(prefab.nodes()));
+    let parts = prefab
+        .into_iter()
+        .flat_map(|prefab| (0..).zip(prefab.nodes()))
+        .filter(|(part, _)| !slot.parts.is_absent(*part));
     std::iter::once(own).chain(parts.map(move |(part, node)| (Target::part(id, part), part_content(node))))
 }

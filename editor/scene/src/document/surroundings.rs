@@ -77,7 +77,8 @@ impl Document {
     }
 
     fn wish_of(&self, node: NodeId) -> Option<&Environment> {
-        self.prefab(self.node(node)?.prefab()?)?.environment.as_ref()
+        let NodeKind::Prefab { prefab, scene, .. } = &self.node(node)?.kind else { return None };
+        self.prefab(*prefab)?.environment_in(scene.as_deref())
     }
 
     fn shines(&self, target: Target) -> bool {

@@ -6,41 +6,64 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::Value;
 
 use super::buffer::{Buffer, Use};
-use super::json::{Object, Put};
-use super::tree::{Stands, Tree};
+use super::foreign::Sources;
+use super::json::{Extensions, Object, Put};
+use super::pointer::{Places, pointer_of};
+use super::tree::Tree;
 use crate::animation::{Animation, Channel, ChannelPath, ClipChoice, Interpolation};
 use crate::document::Document;
+use crate::foreign::{KeptChannel, Numbers};
 use crate::ids::{NodeId, PrefabId, Target};
 use crate::prefab::{Prefab, Skin};
 
-/// Place of the first skin of each instance.
-pub(super) fn first_skins(document: &Document, tree: &Tree) -> BTreeMap<NodeId, usize> {
-    let mut next = 0;
-    let place = |&(node, prefab): &(NodeId, PrefabId)| {
-        let first = next;
-        next += document.prefab(prefab).map_or(0, |prefab| prefab.skins().len());
-        (node, first)
+/// Places of the skins of each instance. A skin of which not all joints are in the file is left out.
+pub(super) fn skin_places(document: &Document, tree: &Tree) -> BTreeMap<(NodeId, u32), usize> {
+    let written = |&(node, prefab): &(NodeId, PrefabId)| {
+        let skins = (0..).zip(document.prefab(prefab).map_or(&[][..], Prefab::skins));
+        let is_whole =
+            move |skin: &Skin| skin.joints.iter().all(|&j| tree.places.contains_key(&Target::part(node, j)));
+        skins.filter(move |(_, skin)| is_whole(skin)).map(move |(number, _)| (node, number))
     };
-    tree.instances.iter().map(place).collect()
+    tree.instances.iter().flat_map(written).zip(0..).collect()
 }
 
 /// The skins of all instances.
-pub(super) fn skins(document: &Document, tree: &Tree, buffer: &mut Buffer) -> Vec<Value> {
-    let of_instance = |(node, prefab): &(NodeId, PrefabId)| -> Vec<Value> {
-        let skins = document.prefab(*prefab).map_or(&[][..], Prefab::skins);
-        skins.iter().map(|skin| Value::Object(write_skin(skin, *node, tree, buffer))).collect()
-    };
-    tree.instances.iter().flat_map(of_instance).collect()
+pub(super) fn skins(
+    places: &BTreeMap<(NodeId, u32), usize>,
+    tree: &Tree,
+    sources: &Sources<'_>,
+    buffer: &mut Buffer,
+    used: &mut Extensions,
+) -> Vec<Value> {
+    let mut in_order: Vec<(usize, (NodeId, u32))> =
+        places.iter().map(|(skin, place)| (*place, *skin)).collect();
+    in_order.sort_unstable();
+    let mut list = Vec::new();
+    for (_, (node, number)) in in_order {
+        let Some((id, prefab)) = tree.prefab_of(node).and_then(|id| Some((id, sources.source(id)?))) else {
+            continue;
+        };
+        let Some(skin) = prefab.skins().get(number as usize) else { continue };
+        let mut object = Object::new();
+        let kept = prefab.foreign.skins.get(&(number as usize));
+        object.put_text("name", kept.map_or("", |kept| &kept.name));
+        write_skin(&mut object, skin, node, tree, buffer);
+        let skeleton = kept.and_then(|kept| tree.places.get(&Target::part(node, kept.skeleton?)));
+        if let Some(skeleton) = skeleton {
+            object.put("skeleton", *skeleton);
+        }
+        sources.put(&mut object, kept.map(|kept| (id, &kept.unknown)), Object::new(), used);
+        list.push(Value::Object(object));
+    }
+    list
 }
 
-fn write_skin(skin: &Skin, node: NodeId, tree: &Tree, buffer: &mut Buffer) -> Object {
+fn write_skin(object: &mut Object, skin: &Skin, node: NodeId, tree: &Tree, buffer: &mut Buffer) {
     let matrices: Vec<[f32; 16]> =
         skin.inverse_bind.iter().map(|matrix| glam::DMat4::from(*matrix).as_mat4().to_cols_array()).collect();
-    let mut object = Object::new();
     object.put("inverseBindMatrices", buffer.floats(&matrices, false, Use::Other));
     let place = |&part: &u32| tree.places.get(&Target::part(node, part)).copied();
     object.put("joints", skin.joints.iter().filter_map(place).collect::<Vec<_>>());
-    object
 }
 
 /// Parts whose transforms clips move.
@@ -55,21 +78,43 @@ pub(super) fn moving(document: &Document, tree: &Tree) -> BTreeSet<Target> {
     moving
 }
 
+/// The clips of the file.
+#[derive(Default)]
+pub(super) struct Clips {
+    pub list: Vec<Value>,
+    /// Where channels point.
+    pub pointers: BTreeSet<String>,
+    /// Channels that change nothing that is in the file.
+    pub left_out: usize,
+}
+
 /// The clips of all prefabs that are placed.
-pub(super) fn clips(document: &Document, tree: &Tree, buffer: &mut Buffer) -> Vec<Value> {
-    let mut list = Vec::new();
-    for id in tree.prefabs() {
-        let nodes: Vec<NodeId> =
-            tree.instances.iter().filter(|(_, prefab)| *prefab == id).map(|(node, _)| *node).collect();
-        let clips = document.prefab(id).map_or(&[][..], |prefab| &prefab.animations);
-        // A clip that moves nothing is not allowed.
-        for clip in
-            clips.iter().filter(|clip| clip.channels.iter().any(|channel| path_name(channel.path).is_some()))
-        {
-            list.push(Value::Object(write_clip(clip, &nodes, tree, buffer)));
+pub(super) fn clips(places: &Places<'_>, buffer: &mut Buffer, used: &mut Extensions) -> Clips {
+    let mut clips = Clips::default();
+    for id in places.tree.prefabs() {
+        let Some(prefab) = places.sources.source(id) else { continue };
+        let instances = places.tree.instances.iter().filter(|(_, prefab)| *prefab == id);
+        let nodes: Vec<NodeId> = instances.map(|(node, _)| *node).collect();
+        for (number, clip) in prefab.animations.iter().enumerate() {
+            let kept = prefab.foreign.channels.get(&number).map_or(&[][..], Vec::as_slice);
+            let mut writer =
+                ClipWriter { places, buffer, clips: &mut clips, channels: Vec::new(), samplers: Vec::new() };
+            writer.write(clip, kept, id, &nodes);
+            let (channels, samplers) = (writer.channels, writer.samplers);
+            // A clip that moves nothing is not allowed.
+            if channels.is_empty() {
+                continue;
+            }
+            let mut object = Object::new();
+            object.put_text("name", &clip.name);
+            object.put("channels", channels);
+            object.put("samplers", samplers);
+            let unknown = prefab.foreign.clips.get(&number).map(|unknown| (id, unknown));
+            places.sources.put(&mut object, unknown, Object::new(), used);
+            clips.list.push(Value::Object(object));
         }
     }
-    list
+    clips
 }
 
 /// Whether the file plays otherwise than the scene does: a reader plays the first clip, or all.
@@ -83,70 +128,58 @@ pub(super) fn plays_otherwise(document: &Document, tree: &Tree) -> bool {
         || sources.filter(|prefab| prefab.is_animated()).count() > 1
 }
 
-fn write_clip(clip: &Animation, nodes: &[NodeId], tree: &Tree, buffer: &mut Buffer) -> Object {
-    let (mut channels, mut samplers) = (Vec::new(), Vec::new());
-    for channel in &clip.channels {
-        let Some(path) = path_name(channel.path) else { continue };
-        for node in nodes {
-            for place in places(channel, *node, tree) {
-                let mut target = Object::new();
-                target.put("node", place);
-                target.put("path", path);
-                let mut object = Object::new();
-                object.put("sampler", samplers.len());
-                object.put("target", target);
-                channels.push(Value::Object(object));
-            }
+/// Writes one clip.
+struct ClipWriter<'a> {
+    places: &'a Places<'a>,
+    buffer: &'a mut Buffer,
+    clips: &'a mut Clips,
+    channels: Vec<Value>,
+    samplers: Vec<Value>,
+}
+
+impl ClipWriter<'_> {
+    fn write(&mut self, clip: &Animation, kept: &[KeptChannel], id: PrefabId, nodes: &[NodeId]) {
+        for channel in &clip.channels {
+            let targets = nodes.iter().flat_map(|node| self.places.targets(channel, *node)).collect();
+            self.push(targets, |buffer| write_sampler(channel, buffer));
         }
-        samplers.push(Value::Object(write_sampler(channel, buffer)));
+        for channel in kept {
+            let targets = self.places.targets_of_kept(channel, id, nodes);
+            self.push(targets, |buffer| {
+                let mut object = Object::new();
+                object.put("input", buffer.numbers(&channel.input, true, Use::Other));
+                if let Some(interpolation) = &channel.interpolation {
+                    object.put("interpolation", interpolation.as_str());
+                }
+                object.put("output", buffer.numbers(&channel.output, false, Use::Other));
+                object
+            });
+        }
     }
-    let mut object = Object::new();
-    object.put_text("name", &clip.name);
-    object.put("channels", channels);
-    object.put("samplers", samplers);
-    object
-}
 
-/// The nodes that a channel moves: weights move the nodes of moved primitives too.
-fn places(channel: &Channel, node: NodeId, tree: &Tree) -> Vec<usize> {
-    let Some(&own) = tree.places.get(&Target::part(node, channel.part)) else {
-        return Vec::new();
-    };
-    if channel.path != ChannelPath::Weights {
-        return vec![own];
+    /// Channels with one sampler. What several parts or instances share is changed once.
+    fn push(&mut self, targets: Vec<Object>, sampler: impl FnOnce(&mut Buffer) -> Object) {
+        if targets.is_empty() {
+            self.clips.left_out += 1;
+        }
+        let before = self.channels.len();
+        for target in targets.into_iter().map(Value::Object) {
+            let is_there = |channel: &Value| channel.get("target") == Some(&target);
+            if let Some(pointer) = pointer_of(&target) {
+                self.clips.pointers.insert(pointer.to_owned());
+                if self.channels.iter().any(is_there) {
+                    continue;
+                }
+            }
+            let mut object = Object::new();
+            object.put("sampler", self.samplers.len());
+            object.put("target", target);
+            self.channels.push(Value::Object(object));
+        }
+        if self.channels.len() > before {
+            self.samplers.push(Value::Object(sampler(self.buffer)));
+        }
     }
-    let children = tree.entries.get(own).map_or(&[][..], |entry| &entry.children);
-    [own]
-        .iter()
-        .chain(children)
-        .copied()
-        .filter(|&place| {
-            let entry = tree.entries.get(place);
-            let is_its = |stands| place == own || matches!(stands, Stands::ForPrimitive(..));
-            entry.is_some_and(|entry| is_its(entry.stands) && entry.mesh.is_some())
-        })
-        .collect()
-}
-
-/// `None` for what is left out: its pointer would have to be written anew.
-fn path_name(path: ChannelPath) -> Option<&'static str> {
-    match path {
-        ChannelPath::Translation => Some("translation"),
-        ChannelPath::Rotation => Some("rotation"),
-        ChannelPath::Scale => Some("scale"),
-        ChannelPath::Weights => Some("weights"),
-        ChannelPath::Visibility
-        | ChannelPath::Light(_)
-        | ChannelPath::Camera(_)
-        | ChannelPath::Material(..) => None,
-    }
-}
-
-/// Channels of the placed prefabs that are left out.
-pub(super) fn left_out(document: &Document, tree: &Tree) -> usize {
-    let clips =
-        tree.prefabs().into_iter().filter_map(|id| document.prefab(id)).flat_map(|prefab| &prefab.animations);
-    clips.flat_map(|clip| &clip.channels).filter(|channel| path_name(channel.path).is_none()).count()
 }
 
 fn write_sampler(channel: &Channel, buffer: &mut Buffer) -> Object {
@@ -158,13 +191,25 @@ fn write_sampler(channel: &Channel, buffer: &mut Buffer) -> Object {
         Interpolation::Linear => {}
         Interpolation::CubicSpline => object.put("interpolation", "CUBICSPLINE"),
     }
-    let place = match channel.path {
-        ChannelPath::Translation | ChannelPath::Scale => {
-            buffer.floats(channel.values.as_chunks::<3>().0, false, Use::Other)
-        }
-        ChannelPath::Rotation => buffer.floats(channel.values.as_chunks::<4>().0, false, Use::Other),
-        _ => buffer.floats(channel.values.as_chunks::<1>().0, false, Use::Other),
+    let sets = if channel.interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+    let width = match channel.path {
+        ChannelPath::Weights => 1,
+        _ => channel.values.len() / (channel.times_s.len() * sets).max(1),
+    };
+    let values = &channel.values;
+    let place = match width {
+        _ if channel.path == ChannelPath::Visibility => buffer.numbers(&truths(values), false, Use::Other),
+        2 => buffer.floats(values.as_chunks::<2>().0, false, Use::Other),
+        3 => buffer.floats(values.as_chunks::<3>().0, false, Use::Other),
+        4 => buffer.floats(values.as_chunks::<4>().0, false, Use::Other),
+        _ => buffer.floats(values.as_chunks::<1>().0, false, Use::Other),
     };
     object.put("output", place);
     object
+}
+
+/// True and false, which the format wants as bytes.
+fn truths(values: &[f32]) -> Numbers {
+    let bytes: Vec<u8> = values.iter().map(|value| u8::from(*value != 0.0)).collect();
+    Numbers { component: 5121, kind: "SCALAR", normalized: false, count: bytes.len(), bytes: bytes.into() }
 }

@@ -8,6 +8,7 @@ use std::ops::Range;
 use serde_json::Value;
 
 use super::json::{Object, Pool, Put};
+use crate::foreign::Numbers;
 
 /// What a buffer view is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -17,6 +18,8 @@ pub(super) enum Use {
     Vertices { set: usize },
     /// Indices of triangles.
     Indices,
+    /// Attributes of vertices that stand farther apart than they are long.
+    Padded { set: usize, stride: usize },
     /// Key frames, matrices, images.
     Other,
 }
@@ -59,6 +62,10 @@ impl Buffer {
         view.put("byteLength", bytes.len());
         match usage {
             Use::Vertices { .. } => view.put("target", 34962),
+            Use::Padded { stride, .. } => {
+                view.put("byteStride", stride);
+                view.put("target", 34962);
+            }
             Use::Indices => view.put("target", 34963),
             Use::Other => {}
         }
@@ -73,6 +80,36 @@ impl Buffer {
         let bytes: Vec<u8> = values.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.view(&bytes, usage);
         self.float_accessor(values, bounds, Some(view))
+    }
+
+    /// An accessor of numbers as they were read. `bounds`: likewise.
+    pub fn numbers(&mut self, numbers: &Numbers, bounds: bool, usage: Use) -> usize {
+        let size = numbers.bytes.len() / numbers.count.max(1);
+        let stride = size.next_multiple_of(4);
+        let view = match usage {
+            // Attributes start at multiples of 4: section 3.6.2.4.
+            Use::Vertices { set } if stride != size => {
+                let filled = |element: &[u8]| {
+                    let mut filled = element.to_vec();
+                    filled.resize(stride, 0);
+                    filled
+                };
+                let bytes: Vec<u8> = numbers.bytes.chunks(size.max(1)).flat_map(filled).collect();
+                self.view(&bytes, Use::Padded { set, stride })
+            }
+            _ => self.view(&numbers.bytes, usage),
+        };
+        let mut accessor = accessor(Some(view), numbers.component, numbers.kind, numbers.count);
+        if numbers.normalized {
+            accessor.put("normalized", true);
+        }
+        if bounds && numbers.component == 5126 {
+            let elements = numbers.bytes.chunks(size.max(1)).map(|element| {
+                element.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect::<Vec<_>>()
+            });
+            put_bounds(&mut accessor, elements);
+        }
+        self.accessors.place(accessor)
     }
 
     /// An accessor of zeros, which takes no bytes.
@@ -94,19 +131,8 @@ impl Buffer {
             _ => "MAT4",
         };
         let mut accessor = accessor(view, 5126, kind, values.len());
-        if let (true, Some(first)) = (bounds, values.first()) {
-            let extreme = |pick: fn(f32, f32) -> f32| -> Value {
-                let mut found = *first;
-                for value in values {
-                    for (a, b) in found.iter_mut().zip(value) {
-                        *a = pick(*a, *b);
-                    }
-                }
-                // With all digits: they have to equal the bytes in double precision too.
-                found.into_iter().map(|value| Value::from(f64::from(value))).collect()
-            };
-            accessor.put("min", extreme(f32::min));
-            accessor.put("max", extreme(f32::max));
+        if bounds {
+            put_bounds(&mut accessor, values.iter().copied());
         }
         self.accessors.place(accessor)
     }
@@ -135,6 +161,28 @@ impl Buffer {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         Lists { bytes: self.bytes, views: self.views, accessors: self.accessors.into_list() }
     }
+}
+
+/// The smallest and largest value of each component.
+fn put_bounds<E: AsRef<[f32]> + AsMut<[f32]> + Clone>(
+    accessor: &mut Object,
+    mut elements: impl Iterator<Item = E>,
+) {
+    let Some(first) = elements.next() else { return };
+    let (mut least, mut largest) = (first.clone(), first);
+    for element in elements {
+        for (a, b) in least.as_mut().iter_mut().zip(element.as_ref()) {
+            *a = a.min(*b);
+        }
+        for (a, b) in largest.as_mut().iter_mut().zip(element.as_ref()) {
+            *a = a.max(*b);
+        }
+    }
+    // With all digits: they have to equal the bytes in double precision too.
+    let wide =
+        |values: &[f32]| -> Value { values.iter().map(|value| Value::from(f64::from(*value))).collect() };
+    accessor.put("min", wide(least.as_ref()));
+    accessor.put("max", wide(largest.as_ref()));
 }
 
 fn accessor(view: Option<usize>, component: u32, kind: &str, count: usize) -> Object {

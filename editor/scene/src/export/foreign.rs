@@ -7,8 +7,8 @@ use serde_json::Value;
 
 use super::json::{Extensions, Object, Put};
 use crate::document::Document;
-use crate::foreign::{Mapping, Unknown};
-use crate::ids::{MaterialId, MeshId, PrefabId};
+use crate::foreign::{Foreign, Kept, KeptTexture, LooseMesh, Mapping, Unknown};
+use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
 use crate::prefab::Prefab;
 
 /// The sources of a scene and what they brought.
@@ -19,6 +19,7 @@ pub(super) struct Sources<'a> {
     owners: BTreeMap<&'a str, PrefabId>,
     meshes: BTreeMap<MeshId, (PrefabId, usize)>,
     materials: BTreeMap<MaterialId, (PrefabId, usize)>,
+    textures: BTreeMap<TextureId, (PrefabId, usize)>,
     /// Place of the first variant of each prefab among all.
     first_variant: BTreeMap<PrefabId, usize>,
     /// What was left out, in words.
@@ -35,6 +36,7 @@ impl<'a> Sources<'a> {
             owners: BTreeMap::new(),
             meshes: BTreeMap::new(),
             materials: BTreeMap::new(),
+            textures: BTreeMap::new(),
             first_variant: BTreeMap::new(),
             warnings: Vec::new(),
         };
@@ -52,6 +54,8 @@ impl<'a> Sources<'a> {
             sources.meshes.extend(prefab.meshes.iter().enumerate().map(place));
             let place = |(place, material): (usize, &MaterialId)| (*material, (id, place));
             sources.materials.extend(prefab.materials.iter().enumerate().map(place));
+            let place = |(place, texture): (usize, &TextureId)| (*texture, (id, place));
+            sources.textures.extend(prefab.textures.iter().enumerate().map(place));
             sources.first_variant.insert(id, variants);
             variants += foreign.variants.len();
         }
@@ -80,8 +84,56 @@ impl<'a> Sources<'a> {
         Some((prefab, self.prefab(prefab)?.foreign.materials.get(&place)?))
     }
 
+    /// A source.
+    pub fn source(&self, id: PrefabId) -> Option<&'a Prefab> {
+        self.prefab(id)
+    }
+
     fn prefab(&self, id: PrefabId) -> Option<&'a Prefab> {
         self.document.prefab(id)
+    }
+
+    /// The same of a primitive.
+    pub fn primitive(&self, mesh: MeshId, primitive: u32) -> Option<(PrefabId, &'a Unknown)> {
+        let &(prefab, place) = self.meshes.get(&mesh)?;
+        Some((prefab, self.prefab(prefab)?.foreign.primitives.get(&(place, primitive as usize))?))
+    }
+
+    /// What is kept of the light of a target.
+    pub fn light(&self, target: Target) -> Option<(PrefabId, &'a Kept)> {
+        let prefab = self.document.prefab_of(target.node)?;
+        Some((prefab, self.prefab(prefab)?.foreign.lights.get(&target.part?)?))
+    }
+
+    /// What is kept of the camera of a target.
+    pub fn camera(&self, target: Target) -> Option<(PrefabId, &'a Kept)> {
+        let prefab = self.document.prefab_of(target.node)?;
+        Some((prefab, self.prefab(prefab)?.foreign.cameras.get(&target.part?)?))
+    }
+
+    /// What is kept of a texture.
+    pub fn texture(&self, texture: TextureId) -> Option<(PrefabId, &'a KeptTexture)> {
+        let &(prefab, place) = self.textures.get(&texture)?;
+        Some((prefab, self.prefab(prefab)?.foreign.textures.get(&place)?))
+    }
+
+    /// Lights, or cameras, of the sources that no node carries.
+    pub fn spare(&self, find: impl Fn(&'a Foreign) -> &'a Vec<Value>, used: &mut Extensions) -> Vec<Value> {
+        let spare: Vec<Value> =
+            self.prefabs.iter().flat_map(|(_, prefab)| find(&prefab.foreign)).cloned().collect();
+        for extensions in spare.iter().filter_map(|value| value.get("extensions")?.as_object()) {
+            extensions.keys().for_each(|name| used.note(name));
+        }
+        spare
+    }
+
+    /// What of the sources is lost: of which, what, and how often.
+    pub fn lost(&self) -> impl Iterator<Item = (&'a Prefab, &'a str, usize)> {
+        let of = |(_, prefab): &(PrefabId, &'a Prefab)| {
+            let prefab = *prefab;
+            prefab.foreign.lost.iter().map(move |(what, count)| (prefab, what.as_str(), *count))
+        };
+        self.prefabs.iter().flat_map(of).collect::<Vec<_>>().into_iter()
     }
 
     /// Puts what is unknown into an object, with what of its `extras` is ours.
@@ -111,11 +163,24 @@ impl<'a> Sources<'a> {
         if let Some(extras) = extras {
             object.put("extras", extras);
         }
+        for (name, inner) in &unknown.within {
+            let member = match name.strip_prefix("extensions/") {
+                Some(extension) => object.get_mut("extensions").and_then(|all| all.get_mut(extension)),
+                // Without members it says what is read without it.
+                None if name == "pbrMetallicRoughness" => {
+                    Some(object.entry(name).or_insert_with(|| Value::Object(Object::new())))
+                }
+                None => object.get_mut(name),
+            };
+            match member.and_then(Value::as_object_mut) {
+                Some(member) => self.put(member, Some((prefab, inner)), Object::new(), used),
+                None => used.homeless += inner.count(),
+            }
+        }
     }
 
-    /// What the sources say about the file as a whole.
+    /// What the sources say about the file as a whole; after what the extensions that are read say of it.
     pub fn put_file(&self, file: &mut Object, used: &mut Extensions) {
-        self.put_each(file, |prefab| &prefab.foreign.file, Object::new(), used);
         let variants = self.prefabs.iter().flat_map(|(_, prefab)| prefab.foreign.variants.clone());
         let variants: Vec<Value> = variants.collect();
         if !variants.is_empty() {
@@ -123,6 +188,7 @@ impl<'a> Sources<'a> {
             value.put("variants", variants);
             used.put(file, "KHR_materials_variants", value);
         }
+        self.put_each(file, |_, prefab| Some(&prefab.foreign.file), Object::new(), used);
     }
 
     /// What they say about the asset, and who made it.
@@ -134,27 +200,34 @@ impl<'a> Sources<'a> {
             }
         }
         asset.put_text("copyright", &makers.join("; "));
-        self.put_each(asset, |prefab| &prefab.foreign.asset, Object::new(), used);
+        self.put_each(asset, |_, prefab| Some(&prefab.foreign.asset), Object::new(), used);
     }
 
-    /// What they say about the scene.
-    pub fn put_scene(&self, scene: &mut Object, own_extras: Object, used: &mut Extensions) {
-        self.put_each(scene, |prefab| &prefab.foreign.scene, own_extras, used);
+    /// What they say about the scenes that are shown. `shown`: their places.
+    pub fn put_scene(
+        &self,
+        scene: &mut Object,
+        shown: &BTreeMap<PrefabId, usize>,
+        own_extras: Object,
+        used: &mut Extensions,
+    ) {
+        let find = |id, prefab: &'a Prefab| prefab.foreign.scenes.get(*shown.get(&id)?);
+        self.put_each(scene, find, own_extras, used);
     }
 
     /// The extensions of each source, and the `extras` of the first that has some.
     fn put_each(
         &self,
         object: &mut Object,
-        find: impl Fn(&'a Prefab) -> &'a Unknown,
+        find: impl Fn(PrefabId, &'a Prefab) -> Option<&'a Unknown>,
         own_extras: Object,
         used: &mut Extensions,
     ) {
         let mut extras = None;
         for &(id, prefab) in self.prefabs.iter().rev() {
-            let unknown = find(prefab);
+            let Some(unknown) = find(id, prefab) else { continue };
             extras = unknown.extras.clone().or(extras);
-            let bare = Unknown { extras: None, extensions: unknown.extensions.clone() };
+            let bare = Unknown { extras: None, ..unknown.clone() };
             self.put(object, Some((id, &bare)), Object::new(), used);
         }
         if let Some((id, _)) = self.prefabs.first() {
@@ -173,19 +246,39 @@ impl<'a> Sources<'a> {
         used: &mut Extensions,
     ) {
         let Some(&(id, mesh)) = self.meshes.get(&mesh) else { return };
-        let (Some(prefab), Some(first)) = (self.prefab(id), self.first_variant.get(&id)) else { return };
+        let Some(prefab) = self.prefab(id) else { return };
         for (number, object) in primitives {
-            let Some(mappings) = prefab.foreign.mappings.get(&(mesh, *number as usize)) else { continue };
-            let mapping = |mapping: &Mapping| {
-                let material = places.get(prefab.materials.get(mapping.material)?)?;
-                let mut object = Object::new();
-                object.put("material", *material);
-                object.put("variants", mapping.variants.iter().map(|v| v + first).collect::<Vec<_>>());
-                Some(Value::Object(object))
-            };
-            let mut value = Object::new();
-            value.put("mappings", mappings.iter().filter_map(mapping).collect::<Vec<_>>());
-            used.put(object, "KHR_materials_variants", value);
+            if let Some(mappings) = prefab.foreign.mappings.get(&(mesh, *number as usize)) {
+                self.put_mappings((id, mappings), object, places, used);
+            }
         }
+    }
+
+    /// Gives a primitive the materials that variants of its source choose.
+    pub fn put_mappings(
+        &self,
+        (id, mappings): (PrefabId, &[Mapping]),
+        object: &mut Object,
+        places: &BTreeMap<MaterialId, usize>,
+        used: &mut Extensions,
+    ) {
+        let (Some(prefab), Some(first)) = (self.prefab(id), self.first_variant.get(&id)) else { return };
+        let mapping = |mapping: &Mapping| {
+            let material = places.get(prefab.materials.get(mapping.material)?)?;
+            let mut object = Object::new();
+            object.put("material", *material);
+            object.put("variants", mapping.variants.iter().map(|v| v + first).collect::<Vec<_>>());
+            Some(Value::Object(object))
+        };
+        let mut value = Object::new();
+        value.put("mappings", mappings.iter().filter_map(mapping).collect::<Vec<_>>());
+        used.put(object, "KHR_materials_variants", value);
+    }
+
+    /// The points and lines of a mesh, with their source.
+    pub fn loose(&self, mesh: MeshId) -> Option<(PrefabId, &'a Prefab, &'a LooseMesh)> {
+        let &(id, place) = self.meshes.get(&mesh)?;
+        let prefab = self.prefab(id)?;
+        Some((id, prefab, prefab.foreign.loose.get(&place)?))
     }
 }

@@ -84,9 +84,14 @@ pub(super) struct Pool {
 impl Pool {
     /// The place of a value, which is added where it is new.
     pub fn place(&mut self, value: Object) -> usize {
+        self.place_of(value, "")
+    }
+
+    /// The same of the value of somebody: values of others are not taken for it, as they may come to differ.
+    pub fn place_of(&mut self, value: Object, owner: &str) -> usize {
         let value = Value::Object(value);
         let next = self.list.len();
-        *self.places.entry(value.to_string()).or_insert_with(|| {
+        *self.places.entry(format!("{owner}{value}")).or_insert_with(|| {
             self.list.push(value);
             next
         })
@@ -100,21 +105,30 @@ impl Pool {
 
 /// Names of the extensions that the file uses.
 #[derive(Default)]
-pub(super) struct Extensions(BTreeSet<String>);
+pub(super) struct Extensions {
+    names: BTreeSet<String>,
+    /// How many `extras` and unknown extensions belong to objects that are not written.
+    pub homeless: usize,
+}
 
 impl Extensions {
     /// Gives an object an extension.
     pub fn put(&mut self, object: &mut Object, name: &str, value: impl Into<Value>) {
-        self.0.insert(name.to_owned());
+        self.note(name);
         let members = object.entry("extensions").or_insert_with(|| Value::Object(Object::new()));
         if let Some(members) = members.as_object_mut() {
             members.put(name, value);
         }
     }
 
+    /// Notes an extension that somebody else puts.
+    pub fn note(&mut self, name: &str) {
+        self.names.insert(name.to_owned());
+    }
+
     /// The names in order.
     pub fn names(&self) -> Vec<Value> {
-        self.0.iter().map(|name| Value::from(name.as_str())).collect()
+        self.names.iter().map(|name| Value::from(name.as_str())).collect()
     }
 }
 

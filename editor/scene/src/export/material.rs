@@ -4,6 +4,7 @@
 
 use glam::{Vec3, Vec4};
 
+use super::foreign::Sources;
 use super::json::{Extensions, Object, Put, number, numbers};
 use super::texture::Textures;
 use crate::assets::{AlphaMode, Material, ShadingMode, SpecularGlossiness, TextureUse};
@@ -18,6 +19,7 @@ const SOME_THICKNESS_M: f32 = 1.0;
 pub(super) struct MaterialWriter<'a, 'b> {
     pub textures: &'a mut Textures<'b>,
     pub used: &'a mut Extensions,
+    pub sources: &'a Sources<'a>,
 }
 
 impl MaterialWriter<'_, '_> {
@@ -123,7 +125,7 @@ impl MaterialWriter<'_, '_> {
 
     fn info(&mut self, texture: &TextureUse) -> Option<Object> {
         let mut info = Object::new();
-        info.put("index", self.textures.place(texture.texture)?);
+        info.put("index", self.textures.place(texture.texture, self.sources, self.used)?);
         if texture.tex_coord != 0 {
             info.put("texCoord", texture.tex_coord);
         }

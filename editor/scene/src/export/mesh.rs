@@ -2,7 +2,7 @@
 //! In: meshes of the document and what is to be written of them. Out: their JSON, and bytes in the buffer. Attributes that
 //! say what is read without them are left out.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use glam::{Vec2, Vec4};
@@ -14,29 +14,43 @@ use super::json::{Extensions, Object, Put, numbers};
 use super::shapes;
 use crate::assets::{Material, Mesh, MeshData, MorphTarget};
 use crate::document::Document;
-use crate::ids::{MaterialId, MeshId};
+use crate::foreign::{Loose, Numbers};
+use crate::ids::{MaterialId, MeshId, PrefabId};
 use crate::import::tangents;
+use crate::prefab::Prefab;
 
 /// One mesh of the file: primitives of a mesh of the document with a choice of materials.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct MeshKey {
     pub mesh: MeshId,
-    /// Which primitives, growing, at least one.
+    /// Which primitives, growing, at least one unless there are points and lines.
     pub primitives: Vec<u32>,
     /// One a primitive of the whole mesh.
     pub materials: Vec<MaterialId>,
+    /// With its points and lines.
+    pub loose: bool,
 }
 
 /// The meshes of the document as triangles.
 pub(super) struct Meshes<'a> {
     document: &'a Document,
     made: BTreeMap<MeshId, Option<Mesh>>,
+    loose: BTreeSet<MeshId>,
 }
 
 impl<'a> Meshes<'a> {
     pub fn new(document: &'a Document) -> Self {
         let of_shapes = document.meshes().filter(|(_, mesh)| mesh.shapes().is_some());
-        Self { document, made: of_shapes.map(|(id, mesh)| (id, shapes::tessellated(mesh))).collect() }
+        let made = of_shapes.map(|(id, mesh)| (id, shapes::tessellated(mesh))).collect();
+        let loose = document.prefabs().flat_map(|(_, prefab)| {
+            prefab.foreign.loose.keys().filter_map(|place| prefab.meshes.get(*place).copied())
+        });
+        Self { document, made, loose: loose.collect() }
+    }
+
+    /// Whether a mesh has points or lines.
+    pub fn has_loose(&self, id: MeshId) -> bool {
+        self.loose.contains(&id)
     }
 
     /// A mesh; `None` where it has too many spheres and boxes, or is not there.
@@ -100,9 +114,11 @@ impl MeshWriter<'_> {
     /// A mesh, and what of its `extras` is ours.
     pub fn write(&mut self, key: &MeshKey, mesh: &Mesh) -> (Object, Object) {
         let sets = vertex_sets(mesh);
-        let used = sets.iter().filter(|set| set.primitives.iter().any(|p| key.primitives.contains(p)));
+        let used: Vec<&VertexSet> =
+            sets.iter().filter(|set| set.primitives.iter().any(|p| key.primitives.contains(p))).collect();
+        let used_count = used.len();
         let mut primitives: BTreeMap<u32, Object> = BTreeMap::new();
-        for (number, set) in used.enumerate() {
+        for (number, set) in used.into_iter().enumerate() {
             let usage = Use::Vertices { set: number };
             let surfaces: Vec<&Material> = set
                 .primitives
@@ -135,13 +151,54 @@ impl MeshWriter<'_> {
         }
         let mut list: Vec<(u32, &mut Object)> = primitives.iter_mut().map(|(p, o)| (*p, o)).collect();
         self.sources.put_variants(key.mesh, &mut list, self.materials, self.used);
+        for (number, object) in list {
+            let unknown = self.sources.primitive(key.mesh, number);
+            self.sources.put(object, unknown, Object::new(), self.used);
+        }
+        let mut list: Vec<Value> = primitives.into_values().map(Value::Object).collect();
+        let loose = self.sources.loose(key.mesh).filter(|_| key.loose);
+        if let Some((id, prefab, loose)) = loose {
+            let written = loose.primitives.iter().zip(used_count..);
+            list.extend(written.map(|(loose, set)| Value::Object(self.loose(id, prefab, loose, set))));
+        }
         let mut object = Object::new();
         object.put_text("name", &mesh.name);
-        object.put("primitives", primitives.into_values().map(Value::Object).collect::<Vec<_>>());
+        object.put("primitives", list);
         if mesh.default_weights.iter().any(|weight| *weight != 0.0) {
             object.put("weights", numbers(&mesh.default_weights));
+        } else if let Some(weights) = loose.and_then(|(_, _, loose)| loose.weights.clone()) {
+            object.put("weights", weights);
         }
         (object, own_extras(&mesh.data))
+    }
+
+    /// Points or lines, as they were read.
+    fn loose(&mut self, id: PrefabId, prefab: &Prefab, loose: &Loose, set: usize) -> Object {
+        let usage = Use::Vertices { set };
+        let mut attributes = |list: &[(String, Numbers)]| {
+            let mut object = Object::new();
+            for (name, numbers) in list {
+                object.put(name, self.buffer.numbers(numbers, name == "POSITION", usage));
+            }
+            object
+        };
+        let mut object = Object::new();
+        object.put("attributes", attributes(&loose.attributes));
+        let targets: Vec<Value> = loose.targets.iter().map(|t| Value::Object(attributes(t))).collect();
+        if let Some(indices) = &loose.indices {
+            object.put("indices", self.buffer.numbers(indices, false, Use::Indices));
+        }
+        let material = loose.material.and_then(|place| prefab.materials.get(place));
+        if let Some(place) = material.and_then(|material| self.materials.get(material)) {
+            object.put("material", *place);
+        }
+        object.put("mode", loose.mode);
+        object.put_filled("targets", targets);
+        if !loose.mappings.is_empty() {
+            self.sources.put_mappings((id, &loose.mappings), &mut object, self.materials, self.used);
+        }
+        self.sources.put(&mut object, Some((id, &loose.unknown)), Object::new(), self.used);
+        object
     }
 
     fn attributes(

@@ -12,13 +12,23 @@ use super::mesh::MeshKey;
 use super::tree::{Entry, Stands, Tree, single_precision};
 use crate::assets::{Camera, Light, LightKind, Projection};
 use crate::document::Document;
-use crate::ids::{NodeId, Target};
+use crate::ids::{NodeId, PrefabId, Target};
 use crate::import::gltf::unit_rotation;
 use crate::node::{NodeKind, RayVisibility};
 use crate::transform::{Local, Trs};
 
 /// Farthest distance of parallel cameras that have none, as the format wants one, metres.
 const FAR_M: f32 = 1e6;
+
+/// Lights, or cameras, in the making.
+#[derive(Default)]
+pub(super) struct Carried {
+    pub pool: Pool,
+    /// By who carries them.
+    pub places: BTreeMap<Target, usize>,
+    /// By source and number in it.
+    pub numbered: BTreeMap<(PrefabId, usize), BTreeSet<usize>>,
+}
 
 /// Writes nodes.
 pub(super) struct NodeWriter<'a> {
@@ -28,12 +38,12 @@ pub(super) struct NodeWriter<'a> {
     pub used: &'a mut Extensions,
     /// Places of the meshes in the file.
     pub meshes: &'a BTreeMap<MeshKey, usize>,
-    /// Place of the first skin of each instance.
-    pub skins: &'a BTreeMap<NodeId, usize>,
+    /// Places of the skins of each instance.
+    pub skins: &'a BTreeMap<(NodeId, u32), usize>,
     /// Parts whose transform a clip moves: they must not have a matrix.
     pub moving: &'a BTreeSet<Target>,
-    pub lights: Pool,
-    pub cameras: Pool,
+    pub lights: Carried,
+    pub cameras: Carried,
     /// What is said otherwise than in the document: the place and why.
     pub warnings: Vec<(String, &'static str)>,
 }
@@ -65,7 +75,8 @@ impl NodeWriter<'_> {
         self.put_place(node, target);
         self.put_mesh(node, entry, target);
         if let Some(camera) = self.document.camera_of(target) {
-            node.put("camera", self.cameras.place(camera_of(&camera)));
+            let place = self.carried(target, camera_of(&camera), false);
+            node.put("camera", place);
         }
         let prefab = self.document.prefab_of(target.node);
         let unknown = target.part.zip(prefab).and_then(|(part, prefab)| self.sources.part(prefab, part));
@@ -73,7 +84,7 @@ impl NodeWriter<'_> {
             // Sizes in the node's own extras would be read where the light has none.
             let speaks = unknown.is_some_and(|(_, unknown)| unknown.extras.is_some());
             let mut value = Object::new();
-            value.put("light", self.lights.place(light_of(&light, speaks)));
+            value.put("light", self.carried(target, light_of(&light, speaks), true));
             self.used.put(node, "KHR_lights_punctual", value);
         }
         if self.document.visible(target) == Some(false) {
@@ -91,6 +102,31 @@ impl NodeWriter<'_> {
             self.warn(target, "which rays meet it is left out, glTF has no word for that");
         }
         self.sources.put(node, unknown, Object::new(), self.used);
+    }
+
+    /// The place of a light or camera in its list, with what its source says of it. Two of a source stay two, also where
+    /// they say the same.
+    fn carried(&mut self, target: Target, mut object: Object, is_light: bool) -> usize {
+        let kept = if is_light { self.sources.light(target) } else { self.sources.camera(target) };
+        let extras = object.remove("extras");
+        let own_extras = extras.and_then(|extras| extras.as_object().cloned()).unwrap_or_default();
+        if let Some((_, kept)) = kept {
+            object.put_text("name", &kept.name);
+        }
+        let unknown = kept.map(|(prefab, kept)| (prefab, &kept.unknown));
+        self.sources.put(&mut object, unknown, own_extras, self.used);
+        let carried = if is_light { &mut self.lights } else { &mut self.cameras };
+        let number = kept.map(|(prefab, kept)| (prefab, kept.number));
+        let owner = match number {
+            Some((prefab, number)) => format!("{} {number} ", prefab.0),
+            None => String::new(),
+        };
+        let place = carried.pool.place_of(object, &owner);
+        carried.places.insert(target, place);
+        if let Some(number) = number {
+            carried.numbered.entry(number).or_default().insert(place);
+        }
+        place
     }
 
     fn put_place(&mut self, node: &mut Object, target: Target) {
@@ -125,9 +161,9 @@ impl NodeWriter<'_> {
             node.put("weights", numbers(&weights));
         }
         let skin = self.document.part(target).and_then(|part| part.skin);
-        if let (Some(skin), Some(first), Stands::For(_)) = (skin, self.skins.get(&target.node), entry.stands)
-        {
-            node.put("skin", first + skin as usize);
+        let skin = skin.and_then(|skin| self.skins.get(&(target.node, skin)));
+        if let (Some(skin), Stands::For(_)) = (skin, entry.stands) {
+            node.put("skin", *skin);
             let moved = |mesh: &crate::assets::Mesh| {
                 mesh.primitives.iter().any(|p| p.mesh_from_primitive != DAffine3::IDENTITY)
             };

@@ -9,7 +9,8 @@ use image::{ExtendedColorType, ImageEncoder};
 use serde_json::Value;
 
 use super::buffer::{Buffer, Use};
-use super::json::{Object, Pool, Put};
+use super::foreign::Sources;
+use super::json::{Extensions, Object, Pool, Put};
 use crate::assets::{Sampler, Texture, Wrap};
 use crate::document::Document;
 use crate::ids::TextureId;
@@ -17,7 +18,8 @@ use crate::ids::TextureId;
 /// What is collected.
 pub(super) struct Textures<'a> {
     document: &'a Document,
-    images: Vec<(String, Arc<[u8]>)>,
+    /// What is said of each image, and its bytes.
+    images: Vec<(Object, Arc<[u8]>)>,
     places: HashMap<(String, Arc<[u8]>), usize>,
     samplers: Pool,
     textures: Pool,
@@ -45,28 +47,41 @@ impl<'a> Textures<'a> {
     }
 
     /// The place of a texture in the file; `None` when the document does not have it.
-    pub fn place(&mut self, id: TextureId) -> Option<usize> {
+    pub fn place(&mut self, id: TextureId, sources: &Sources<'_>, used: &mut Extensions) -> Option<usize> {
         let texture = self.document.texture(id)?;
+        let kept = sources.texture(id);
         let mut object = Object::new();
-        if texture.sampler != Sampler::default() {
-            object.put("sampler", self.samplers.place(sampler(&texture.sampler)));
+        let mut own = Object::new();
+        if let Some((prefab, kept)) = kept {
+            own.put_text("name", &kept.sampler_name);
+            sources.put(&mut own, Some((prefab, &kept.sampler)), Object::new(), used);
+            object.put_text("name", &kept.name);
         }
-        match self.image(texture) {
+        if texture.sampler != Sampler::default() || !own.is_empty() {
+            let mut sampler = sampler(&texture.sampler);
+            sampler.extend(own);
+            object.put("sampler", self.samplers.place(sampler));
+        }
+        let mut image = Object::new();
+        image.put_text("name", &texture.name);
+        sources.put(&mut image, kept.map(|(prefab, kept)| (prefab, &kept.image)), Object::new(), used);
+        match self.image(texture, image) {
             Some(image) => object.put("source", image),
             None => self.missing.push(texture.name.clone()),
         }
+        sources.put(&mut object, kept.map(|(prefab, kept)| (prefab, &kept.unknown)), Object::new(), used);
         Some(self.textures.place(object))
     }
 
-    fn image(&mut self, texture: &Texture) -> Option<usize> {
+    fn image(&mut self, texture: &Texture, image: Object) -> Option<usize> {
         if texture.placeholder {
             return None;
         }
         let bytes = texture.encoded.clone().or_else(|| png(texture))?;
         let next = self.images.len();
-        let key = (texture.name.clone(), bytes);
-        Some(*self.places.entry(key).or_insert_with_key(|key| {
-            self.images.push(key.clone());
+        let key = (Value::Object(image.clone()).to_string(), bytes);
+        Some(*self.places.entry(key).or_insert_with_key(|(_, bytes)| {
+            self.images.push((image, Arc::clone(bytes)));
             next
         }))
     }
@@ -74,9 +89,7 @@ impl<'a> Textures<'a> {
     /// The lists; the images go into the buffer.
     pub fn finish(self, buffer: &mut Buffer) -> TextureLists {
         let mut images = Vec::with_capacity(self.images.len());
-        for (name, bytes) in self.images {
-            let mut image = Object::new();
-            image.put_text("name", &name);
+        for (mut image, bytes) in self.images {
             let is_png = bytes.starts_with(b"\x89PNG");
             image.put("mimeType", if is_png { "image/png" } else { "image/jpeg" });
             image.put("bufferView", buffer.view(&bytes, Use::Other));

@@ -7,7 +7,7 @@ use glam::{DAffine3, DQuat, Quat};
 
 use super::mesh::{MeshKey, Meshes};
 use crate::document::Document;
-use crate::ids::{NodeId, PrefabId, Target};
+use crate::ids::{MeshId, NodeId, PrefabId, Target};
 use crate::import::gltf::unit_rotation;
 use crate::node::NodeKind;
 use crate::transform::Local;
@@ -41,6 +41,8 @@ pub(super) struct Tree {
     pub roots: Vec<usize>,
     /// Places of nodes and parts.
     pub places: BTreeMap<Target, usize>,
+    /// The only root, when it places a file as it is: its parts are the roots, those that are not shown too.
+    pub whole: Option<(NodeId, PrefabId)>,
     /// Instances of prefabs in order.
     pub instances: Vec<(NodeId, PrefabId)>,
 }
@@ -48,10 +50,14 @@ pub(super) struct Tree {
 impl Tree {
     pub fn of(document: &Document, meshes: &Meshes<'_>) -> Self {
         let mut tree = Self::default();
-        let tops: Vec<Target> = match whole_file(document) {
+        tree.whole = whole_file(document);
+        let tops: Vec<Target> = match tree.whole {
             Some((node, prefab)) => {
                 tree.instances.push((node, prefab));
-                document.children_of(node.into())
+                let roots = document.prefab(prefab).into_iter().flat_map(|prefab| prefab.children(None));
+                let roots = roots.map(|part| Target::part(node, part));
+                let (absent, present): (Vec<_>, Vec<_>) = roots.partition(|root| document.is_absent(*root));
+                present.into_iter().chain(absent).collect()
             }
             None => document.roots().iter().copied().map(Target::node).collect(),
         };
@@ -59,9 +65,13 @@ impl Tree {
             tops.into_iter().rev().map(|target| (Stands::For(target), None)).collect();
         while let Some((stands, parent)) = stack.pop() {
             let place = tree.entries.len();
-            let list =
-                parent.and_then(|parent| tree.entries.get_mut(parent)).map(|entry| &mut entry.children);
-            list.unwrap_or(&mut tree.roots).push(place);
+            match (parent, stands) {
+                (Some(parent), _) => {
+                    tree.entries.get_mut(parent).into_iter().for_each(|entry| entry.children.push(place));
+                }
+                (None, Stands::For(target)) if document.is_absent(target) => {}
+                (None, _) => tree.roots.push(place),
+            }
             let mut entry = Entry { stands, children: Vec::new(), mesh: None, instances: Vec::new() };
             match stands {
                 Stands::For(target) => {
@@ -72,12 +82,17 @@ impl Tree {
                     stack.extend(below(document, meshes, target, &mut entry).map(|s| (s, Some(place))));
                 }
                 Stands::ForPrimitive(target, primitive) => {
-                    entry.mesh = key(document, meshes, target, |p| p == primitive);
+                    entry.mesh = key(document, meshes, target, false, |p| p == primitive);
                 }
             }
             tree.entries.push(entry);
         }
         tree
+    }
+
+    /// The prefab of an instance.
+    pub fn prefab_of(&self, node: NodeId) -> Option<PrefabId> {
+        self.instances.iter().find(|(instance, _)| *instance == node).map(|(_, prefab)| *prefab)
     }
 
     /// The prefabs that are placed, in order.
@@ -105,29 +120,46 @@ fn below(
     entry: &mut Entry,
 ) -> impl Iterator<Item = Stands> + use<> {
     let moved = moved_primitives(document, meshes, target);
-    entry.mesh = key(document, meshes, target, |p| !moved.contains(&p));
+    entry.mesh = key(document, meshes, target, true, |p| !moved.contains(&p));
     let mut children = document.children_of(target);
     if let Some(count) = gpu_instances(document, meshes, target) {
         entry.instances = children.drain(..count).collect();
-        entry.mesh = entry.instances.first().and_then(|first| key(document, meshes, *first, |_| true));
+        entry.mesh = entry.instances.first().and_then(|first| key(document, meshes, *first, true, |_| true));
     }
     let primitives = moved.into_iter().map(move |primitive| Stands::ForPrimitive(target, primitive));
     children.into_iter().rev().map(Stands::For).chain(primitives.rev())
 }
 
-/// The mesh of the file for some primitives of the mesh of a target; `None` for none.
+/// The mesh of the file for some primitives of the mesh of a target, and its points and lines if `loose`; `None` for none.
 fn key(
     document: &Document,
     meshes: &Meshes<'_>,
     target: Target,
+    loose: bool,
     wanted: impl Fn(u32) -> bool,
 ) -> Option<MeshKey> {
-    let id = document.mesh_of(target)?;
-    let mesh = meshes.get(id)?;
+    let id = document.mesh_of(target).or_else(|| loose_mesh(document, target).filter(|_| loose))?;
+    let (mesh, loose) = (meshes.get(id)?, loose && meshes.has_loose(id));
     let with_triangles = (0..).zip(&mesh.primitives).filter(|(_, primitive)| primitive.index_count > 0);
     let primitives: Vec<u32> = with_triangles.map(|(number, _)| number).filter(|p| wanted(*p)).collect();
     let materials = document.materials_of(target, mesh);
-    (!primitives.is_empty()).then_some(MeshKey { mesh: id, primitives, materials })
+    (loose || !primitives.is_empty()).then_some(MeshKey { mesh: id, primitives, materials, loose })
+}
+
+/// The mesh of a part that places nothing but points and lines.
+fn loose_mesh(document: &Document, target: Target) -> Option<MeshId> {
+    let prefab = document.prefab(document.prefab_of(target.node)?)?;
+    let place = prefab.foreign.loose_parts.get(&target.part?)?;
+    prefab.meshes.get(*place).copied()
+}
+
+/// A mesh of a source that no part places, as a whole.
+pub(super) fn unplaced(meshes: &Meshes<'_>, id: MeshId) -> Option<MeshKey> {
+    let (mesh, loose) = (meshes.get(id)?, meshes.has_loose(id));
+    let with_triangles = (0..).zip(&mesh.primitives).filter(|(_, primitive)| primitive.index_count > 0);
+    let primitives: Vec<u32> = with_triangles.map(|(number, _)| number).collect();
+    let materials = mesh.primitives.iter().map(|primitive| primitive.material).collect();
+    (loose || !primitives.is_empty()).then_some(MeshKey { mesh: id, primitives, materials, loose })
 }
 
 /// Primitives that get nodes of their own. None of a mesh that a skin bends: the node of such a mesh places nothing.

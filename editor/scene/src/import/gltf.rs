@@ -20,12 +20,14 @@ mod compressed;
 mod container;
 mod foreign;
 mod json;
+mod loose;
 mod material;
 mod mesh;
 mod node;
 mod skin;
 mod texture;
 
+pub(crate) use check::is_read;
 pub(crate) use material::{INFINITE_IOR, is_smooth_glass};
 pub(crate) use node::unit as unit_rotation;
 
@@ -67,15 +69,20 @@ fn read(
     if meshes.uses_default_material {
         materials.push(Material { name: "default".to_owned(), ..Material::default() });
     }
-    let mut tree = node::read_scene(&root, &accessors, &meshes.list)?;
-    let skins = skin::read_all(&root, &accessors, &meshes.list, &mut tree)?;
-    let animations = animation::read_all(&root, &accessors, &meshes.list, &materials, &mut tree)?;
-    let foreign = foreign::read(&root, &mut meshes, &mut tree)?;
+    let mut tree = node::read_scenes(&root, &accessors, &meshes)?;
+    let (skins, skin_places) = skin::read_all(&root, &accessors, &meshes.list, &mut tree)?;
+    let (animations, channels) = animation::read_all(&root, &accessors, &meshes.list, &materials, &mut tree)?;
+    let mut foreign = foreign::read(&root, &mut meshes, &mut tree, &skin_places)?;
+    foreign.channels = channels;
     progress("decoding images", 0.5);
+    foreign.lost.extend(textures.unused());
+    foreign.textures = textures.kept(&root)?;
     let (textures, image_warnings) =
         textures.load(&root, accessors.buffers(), &views, folder, options.max_image_extent_px)?;
     let mut prefab = Prefab::new(file_stem(path), path);
-    prefab.environment = tree.environment;
+    let shown = tree.scenes.get(tree.default_scene);
+    prefab.environment = shown.and_then(|scene| scene.environment.clone());
+    prefab.set_scenes(tree.scenes, tree.default_scene);
     prefab.animations = animations;
     prefab.set_skins(skins);
     prefab.set_nodes(tree.parts).map_err(|error| Fault::new("/nodes", error.to_string()))?;
@@ -95,7 +102,7 @@ fn read(
 
 /// What the file has and the program does not show.
 fn left_out_warnings(extensions: &[String], foreign: &Foreign) -> Vec<Fault> {
-    let kept: BTreeSet<&String> = foreign.all().flat_map(|object| object.extensions.keys()).collect();
+    let kept: BTreeSet<&String> = foreign.all().flat_map(|object| object.extension_names()).collect();
     let warning = |name: &String| {
         let what = if kept.contains(name) { "is only kept for exports" } else { "is left out" };
         Fault::new("/extensionsUsed", format!("{name} is not supported and {what}"))

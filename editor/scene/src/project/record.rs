@@ -185,6 +185,9 @@ pub(crate) struct NodeRecord {
     /// Name of the variant of materials; absent: those of the meshes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<String>,
+    /// Name of the scene of the source; absent: the one that it shows by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshId>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -212,6 +215,7 @@ impl NodeRecord {
             overrides: BTreeMap::new(),
             clip: ClipChoice::default(),
             variant: None,
+            scene: None,
             mesh: None,
             materials: Vec::new(),
             weights: Vec::new(),
@@ -220,9 +224,10 @@ impl NodeRecord {
         };
         match &node.kind {
             NodeKind::Group => {}
-            NodeKind::Prefab { prefab, overrides, clip, variant } => {
+            NodeKind::Prefab { prefab, overrides, clip, variant, scene } => {
                 record.prefab = Some(*prefab);
                 record.variant.clone_from(variant);
+                record.scene.clone_from(scene);
                 record.clip = *clip;
                 let overrides = overrides.iter();
                 record.overrides = overrides
@@ -243,10 +248,11 @@ impl NodeRecord {
     /// The node, without children.
     pub fn into_node(self) -> (NodeId, Node) {
         let kind = match self {
-            Self { prefab: Some(prefab), overrides, clip, variant, .. } => NodeKind::Prefab {
+            Self { prefab: Some(prefab), overrides, clip, variant, scene, .. } => NodeKind::Prefab {
                 prefab,
                 clip,
                 variant,
+                scene,
                 overrides: overrides.into_iter().map(|(path, value)| (path, value.into())).collect(),
             },
             Self { mesh: Some(mesh), materials, weights, .. } => NodeKind::Mesh { mesh, materials, weights },

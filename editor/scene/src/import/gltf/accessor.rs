@@ -6,9 +6,12 @@ use super::buffers::Buffers;
 use super::check::Counts;
 use super::compressed;
 use super::json::{Fault, Item};
+use crate::foreign::Numbers;
 
 /// Most elements of an accessor that no bytes stand behind.
 const MAX_UNBACKED_COUNT: usize = 1 << 24;
+/// Bytes of 16 components of 4 bytes.
+const MAX_ELEMENT_BYTES: usize = 64;
 
 /// Type of one component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +34,18 @@ impl Component {
             5125 => Ok(Self::U32),
             5126 => Ok(Self::F32),
             other => Err(item.fault(format!("component type {other} does not exist"))),
+        }
+    }
+
+    /// Number of the format for it.
+    const fn code(self) -> u32 {
+        match self {
+            Self::I8 => 5120,
+            Self::U8 => 5121,
+            Self::I16 => 5122,
+            Self::U16 => 5123,
+            Self::U32 => 5125,
+            Self::F32 => 5126,
         }
     }
 
@@ -200,6 +215,41 @@ impl<'a> Accessors<'a> {
         }
         let component = accessor.component;
         self.elements(accessor, 0, |element| whole(component, element))
+    }
+
+    /// The elements as they stand in the file; `as_floats`: as the floats that they stand for.
+    pub fn numbers(&self, index: usize, as_floats: bool) -> Result<Numbers, Fault> {
+        let accessor = self.get(index)?;
+        let size = accessor.width * accessor.component.bytes();
+        let bytes: Vec<u8> = if as_floats {
+            let floats = self.floats::<16>(index, 0.0)?;
+            let own = floats.iter().flat_map(|element| element.iter().take(accessor.width));
+            own.flat_map(|value| value.to_le_bytes()).collect()
+        } else {
+            let read = |element: &[u8]| {
+                let mut out = [0; MAX_ELEMENT_BYTES];
+                out.iter_mut().zip(element).for_each(|(to, from)| *to = *from);
+                out
+            };
+            let elements = self.elements(accessor, [0; MAX_ELEMENT_BYTES], read)?;
+            elements.iter().flat_map(|element| element.iter().take(size)).copied().collect()
+        };
+        let kind = match (accessor.width, accessor.is_matrix) {
+            (1, _) => "SCALAR",
+            (2, _) => "VEC2",
+            (3, _) => "VEC3",
+            (4, false) => "VEC4",
+            (4, true) => "MAT2",
+            (9, _) => "MAT3",
+            _ => "MAT4",
+        };
+        Ok(Numbers {
+            component: if as_floats { Component::F32.code() } else { accessor.component.code() },
+            kind,
+            normalized: accessor.normalized && !as_floats,
+            count: accessor.count,
+            bytes: bytes.into(),
+        })
     }
 
     fn elements<T: Copy>(

@@ -2,7 +2,7 @@
 //! In: JSON, checked accessors, materials and the tree. Out: clips whose times grow and whose numbers are finite. A channel
 //! that does not hold what it has to is left out with a warning; the rest of the file does not depend on it.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use super::accessor::{Accessors, Component};
@@ -10,27 +10,32 @@ use super::json::{Fault, Item};
 use super::node::Tree;
 use crate::animation::{Animation, Channel, ChannelPath, Interpolation};
 use crate::assets::{Camera, Light, Material, Mesh};
+use crate::foreign::KeptChannel;
 use crate::transform::Local;
 
 mod pointer;
 
-/// Reads all animations in the order of the file.
+/// Reads all animations in the order of the file; and the channels that can only be kept, by animation.
 pub(super) fn read_all(
     root: &Item<'_>,
     accessors: &Accessors<'_>,
     meshes: &[Mesh],
     materials: &[Material],
     tree: &mut Tree,
-) -> Result<Vec<Arc<Animation>>, Fault> {
+) -> Result<(Vec<Arc<Animation>>, BTreeMap<usize, Vec<KeptChannel>>), Fault> {
     let mut warnings = Vec::new();
     let nodes = root.objects("nodes")?;
     let reader = Reader { accessors, meshes, materials, nodes, tree };
-    let mut clips = Vec::new();
-    for item in root.objects("animations")? {
-        clips.push(Arc::new(reader.read(&item, &mut warnings)?));
+    let (mut clips, mut kept) = (Vec::new(), BTreeMap::new());
+    for (place, item) in root.objects("animations")?.iter().enumerate() {
+        let (clip, unplayed) = reader.read(item, &mut warnings)?;
+        clips.push(Arc::new(clip));
+        if !unplayed.is_empty() {
+            kept.insert(place, unplayed);
+        }
     }
     tree.warnings.append(&mut warnings);
-    Ok(clips)
+    Ok((clips, kept))
 }
 
 struct Reader<'a> {
@@ -45,9 +50,13 @@ struct Reader<'a> {
 type Targets = Vec<(u32, ChannelPath)>;
 
 impl Reader<'_> {
-    fn read(&self, item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Animation, Fault> {
+    fn read(
+        &self,
+        item: &Item<'_>,
+        warnings: &mut Vec<Fault>,
+    ) -> Result<(Animation, Vec<KeptChannel>), Fault> {
         let samplers = item.objects("samplers")?;
-        let mut channels = Vec::new();
+        let (mut channels, mut kept) = (Vec::new(), Vec::new());
         let mut seen = HashSet::new();
         for channel in item.objects("channels")? {
             let index = channel.required_index("sampler", samplers.len(), "sampler")?;
@@ -66,10 +75,16 @@ impl Reader<'_> {
                         channels.push(read);
                     }
                 }
-                Err(reason) => warnings.push(channel.fault(format!("{reason}; it was left out"))),
+                Err(reason) => {
+                    let unplayed = self.unplayed(sampler, &target)?;
+                    let what =
+                        if unplayed.is_some() { "it is only kept for exports" } else { "it was left out" };
+                    warnings.push(channel.fault(format!("{reason}; {what}")));
+                    kept.extend(unplayed);
+                }
             }
         }
-        Ok(Animation::new(item.name()?, channels))
+        Ok((Animation::new(item.name()?, channels), kept))
     }
 
     fn warn_about(&self, item: &Item<'_>, channel: &Channel, warnings: &mut Vec<Fault>) {

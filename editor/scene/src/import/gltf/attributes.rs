@@ -10,7 +10,8 @@ use super::super::geometry::{Attributes, Deltas, Hold};
 use super::accessor::{Accessor, Accessors, Component};
 use super::json::{Fault, Item};
 
-const BASE: [&str; 6] = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"];
+/// Attributes that are read, beside joints and their weights.
+pub(super) const BASE: [&str; 6] = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"];
 const MORPHED: [&str; 3] = ["POSITION", "NORMAL", "TANGENT"];
 /// Most sets of four joints that are looked at; glTF knows no limit.
 const MAX_JOINT_SETS: usize = 16;

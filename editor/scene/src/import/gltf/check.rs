@@ -34,7 +34,7 @@ const SUPPORTED: &[&str] = &[
 ];
 
 /// Whether an extension is read, so that an export writes it from what the document says.
-pub(super) fn is_read(name: &str) -> bool {
+pub(crate) fn is_read(name: &str) -> bool {
     SUPPORTED.contains(&name) && name != "KHR_xmp_json_ld"
 }
 

@@ -1,29 +1,39 @@
 //! What the reader does not know and an export shall say again: `extras` and unknown extensions, as they stand.
-//! In: JSON and the tree. Out: [`Foreign`]. Extensions whose values point into the lists of the file are not kept:
-//! an export numbers the lists anew.
+//! In: JSON and the tree. Out: [`Foreign`]. Extensions whose values point into the lists of the file are not kept, but
+//! counted: an export numbers the lists anew.
+
+use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
 use super::check;
 use super::json::{Fault, Item};
 use super::mesh::Meshes;
-use super::node::{Tree, chosen_scene};
-use crate::foreign::{Foreign, Unknown};
+use super::node::Tree;
+use crate::foreign::{Foreign, Kept, KeptSkin, Unknown};
 
-/// Extensions that hold indices of nodes, meshes, images or buffer views.
+/// Extensions that hold indices of nodes, meshes, images, accessors or buffer views.
 const POINTING: &[&str] = &[
+    "CESIUM_primitive_outline",
     "EXT_mesh_features",
     "EXT_structural_metadata",
+    "EXT_texture_avif",
     "KHR_audio_emitter",
     "KHR_interactivity",
     "KHR_physics_rigid_bodies",
     "MSFT_lod",
     "MSFT_packing_normalRoughnessMetallic",
     "MSFT_packing_occlusionRoughnessMetallic",
+    "MSFT_texture_dds",
 ];
 
-/// Collects what is kept of a file.
-pub(super) fn read(root: &Item<'_>, meshes: &mut Meshes, tree: &mut Tree) -> Result<Foreign, Fault> {
+/// Collects what is kept of a file. `skins`: which of those of the file were read.
+pub(super) fn read(
+    root: &Item<'_>,
+    meshes: &mut Meshes,
+    tree: &mut Tree,
+    skins: &[Option<u32>],
+) -> Result<Foreign, Fault> {
     let mut foreign = Foreign {
         file: unknown(root, &[]),
         variants: match root.extension("KHR_materials_variants")? {
@@ -32,17 +42,23 @@ pub(super) fn read(root: &Item<'_>, meshes: &mut Meshes, tree: &mut Tree) -> Res
         },
         instanced: std::mem::take(&mut tree.instanced),
         mappings: std::mem::take(&mut meshes.variants),
+        primitives: std::mem::take(&mut meshes.unknown),
+        loose: std::mem::take(&mut meshes.loose),
+        loose_parts: std::mem::take(&mut tree.loose_parts),
+        lost: std::mem::take(&mut meshes.lost),
         ..Foreign::default()
     };
+    for what in std::mem::take(&mut tree.lost) {
+        *foreign.lost.entry(what.to_owned()).or_default() += 1;
+    }
+    // Read on its own.
+    foreign.file.within.remove("asset");
     if let Some(asset) = root.child("asset")? {
         foreign.copyright = asset.text("copyright")?.map(str::to_owned);
         foreign.asset = unknown(&asset, &[]);
     }
-    if let Some(scene) = chosen_scene(root)? {
-        let own = scene.get("extras").and_then(|extras| extras.get("environment"));
-        let is_ours = own.is_some_and(|environment| environment.get("constantRadiance").is_some());
-        foreign.scene = unknown(&scene, if is_ours { &["environment"] } else { &[] });
-    }
+    foreign.scenes = root.objects("scenes")?.iter().map(of_scene).collect();
+    foreign.scenes.resize(tree.scenes.len(), Unknown::default());
     for (node, item) in root.objects("nodes")?.iter().enumerate() {
         let part = tree.part_of_node.get(node).copied().flatten();
         if let Some((part, kept)) = part.zip(some_unknown(item, &[])) {
@@ -56,7 +72,66 @@ pub(super) fn read(root: &Item<'_>, meshes: &mut Meshes, tree: &mut Tree) -> Res
         let kept = some_unknown(item, &["volumePriority", "shadingMode"]);
         foreign.materials.extend(kept.map(|kept| (material, kept)));
     }
+    for (clip, item) in root.objects("animations")?.iter().enumerate() {
+        foreign.clips.extend(some_unknown(item, &[]).map(|kept| (clip, kept)));
+    }
+    for (item, place) in root.objects("skins")?.iter().zip(skins) {
+        let Some(place) = *place else { continue };
+        let skeleton = item.size("skeleton")?.and_then(|node| tree.part_of_node.get(node).copied().flatten());
+        let kept = KeptSkin { name: item.name()?, unknown: unknown(item, &[]), skeleton };
+        foreign.skins.insert(place as usize, kept);
+    }
+    let (lights, cameras) = carried(root)?;
+    (foreign.lights, foreign.spare_lights) = kept_of(tree, &lights, |part| tree.light_of.get(&part))?;
+    (foreign.cameras, foreign.spare_cameras) = kept_of(tree, &cameras, |part| tree.camera_of.get(&part))?;
+    count_pointing(root.value(), &mut foreign.lost);
     Ok(foreign)
+}
+
+/// The lists of lights and of cameras.
+pub(super) fn carried<'a>(root: &Item<'a>) -> Result<(Vec<Item<'a>>, Vec<Item<'a>>), Fault> {
+    let lights = match root.extension("KHR_lights_punctual")? {
+        Some(extension) => extension.objects("lights")?,
+        None => Vec::new(),
+    };
+    Ok((lights, root.objects("cameras")?))
+}
+
+fn of_scene(scene: &Item<'_>) -> Unknown {
+    let own = scene.get("extras").and_then(|extras| extras.get("environment"));
+    let is_ours = own.is_some_and(|environment| environment.get("constantRadiance").is_some());
+    unknown(scene, if is_ours { &["environment"] } else { &[] })
+}
+
+/// What is kept of the lights or cameras that parts carry, and those that none does. `which`: by part.
+fn kept_of<'a>(
+    tree: &Tree,
+    items: &[Item<'_>],
+    which: impl Fn(u32) -> Option<&'a usize>,
+) -> Result<(BTreeMap<u32, Kept>, Vec<Value>), Fault> {
+    let mut numbers: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut kept = BTreeMap::new();
+    for part in 0..tree.parts.len() as u32 {
+        let Some((index, item)) = which(part).and_then(|&index| Some((index, items.get(index)?))) else {
+            continue;
+        };
+        let next = numbers.len();
+        let number = *numbers.entry(index).or_insert(next);
+        let size = if item.text("type")? == Some("directional") { "angle" } else { "radius" };
+        kept.insert(part, Kept { number, name: item.name()?, unknown: unknown(item, &[size]) });
+    }
+    let spare = items.iter().enumerate().filter(|(index, _)| !numbers.contains_key(index));
+    Ok((kept, spare.map(|(_, item)| item.value().clone()).collect()))
+}
+
+/// The numbers that [`Kept`] gives to what parts carry, by place in the file.
+pub(super) fn numbers_of(carried: &BTreeMap<u32, usize>) -> BTreeMap<usize, usize> {
+    let mut numbers = BTreeMap::new();
+    for &index in carried.values() {
+        let next = numbers.len();
+        numbers.entry(index).or_insert(next);
+    }
+    numbers
 }
 
 /// What is unknown about an object, if there is anything. `read`: the keys of its `extras` that are read.
@@ -64,12 +139,24 @@ fn some_unknown(item: &Item<'_>, read: &[&str]) -> Option<Unknown> {
     Some(unknown(item, read)).filter(|unknown| !unknown.is_empty())
 }
 
-fn unknown(item: &Item<'_>, read: &[&str]) -> Unknown {
+/// What is unknown about an object and the objects in it.
+pub(super) fn unknown(item: &Item<'_>, read: &[&str]) -> Unknown {
+    item.value().as_object().map(|object| of_object(object, read)).unwrap_or_default()
+}
+
+fn of_object(object: &Map<String, Value>, read: &[&str]) -> Unknown {
     let is_kept = |name: &str| !check::is_read(name) && !POINTING.contains(&name);
-    let extensions = item.raw("extensions").and_then(Value::as_object);
+    let extensions = || object.get("extensions").and_then(Value::as_object).into_iter().flatten();
+    let known = extensions().filter(|(name, _)| check::is_read(name));
+    let known = known.map(|(name, value)| (format!("extensions/{name}"), value));
+    let members = object.iter().filter(|(name, _)| !["extras", "extensions"].contains(&name.as_str()));
+    let members = members.map(|(name, value)| (name.clone(), value));
+    let within = members.chain(known).filter_map(|(name, value)| Some((name, value.as_object()?)));
+    let within = within.map(|(name, inner)| (name, of_object(inner, &[])));
     Unknown {
-        extras: item.raw("extras").and_then(|extras| without(extras, read)),
-        extensions: filtered(extensions.into_iter().flatten(), is_kept),
+        extras: object.get("extras").and_then(|extras| without(extras, read)),
+        extensions: filtered(extensions(), is_kept),
+        within: within.filter(|(_, inner)| !inner.is_empty()).collect(),
     }
 }
 
@@ -89,4 +176,28 @@ fn filtered<'a>(
 ) -> Map<String, Value> {
     let kept = members.into_iter().filter(|(name, _)| keep(name));
     kept.map(|(name, value)| (name.clone(), value.clone())).collect()
+}
+
+/// Counts the extensions that point into the lists, wherever they are.
+fn count_pointing(value: &Value, lost: &mut BTreeMap<String, usize>) {
+    let mut stack = vec![value];
+    while let Some(value) = stack.pop() {
+        match value {
+            Value::Array(items) => stack.extend(items),
+            Value::Object(members) => {
+                for (name, inner) in members.iter().filter(|(name, _)| *name != "extras") {
+                    let pointing = name.as_str() == "extensions";
+                    for (name, _) in inner.as_object().filter(|_| pointing).into_iter().flatten() {
+                        if POINTING.contains(&name.as_str()) {
+                            *lost
+                                .entry(format!("{name}, which points into the lists of the file"))
+                                .or_default() += 1;
+                        }
+                    }
+                    stack.push(inner);
+                }
+            }
+            _ => {}
+        }
+    }
 }

@@ -1,5 +1,5 @@
 //! Meshes: accessors to attributes, any triangle topology to lists, then the mesh builder.
-//! In: JSON and checked accessors. Out: meshes and what was repaired. Points and lines are left out.
+//! In: JSON and checked accessors. Out: meshes and what was repaired. Points and lines are only kept (`loose.rs`).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,10 +7,12 @@ use rayon::prelude::*;
 
 use super::super::geometry::{MeshBuilder, PrimitiveInput, Repairs};
 use super::accessor::Accessors;
-use super::attributes::AttributeReader;
+use super::attributes::{AttributeReader, BASE};
+use super::foreign::unknown;
 use super::json::{Fault, Item};
+use super::loose;
 use crate::assets::{Material, Mesh};
-use crate::foreign::Mapping;
+use crate::foreign::{LooseMesh, Mapping, Unknown};
 use crate::ids::MaterialId;
 
 /// All meshes, and whether a primitive asked for the default material.
@@ -20,6 +22,12 @@ pub(super) struct Meshes {
     pub uses_default_material: bool,
     /// What variants of materials choose, by mesh and primitive.
     pub variants: BTreeMap<(usize, usize), Vec<Mapping>>,
+    /// What is not known of primitives, likewise.
+    pub unknown: BTreeMap<(usize, usize), Unknown>,
+    /// Points and lines, by mesh.
+    pub loose: BTreeMap<usize, LooseMesh>,
+    /// What cannot be kept, and how often it is there.
+    pub lost: BTreeMap<String, usize>,
     pub warnings: Vec<Fault>,
 }
 
@@ -46,6 +54,11 @@ pub(super) fn read_all(
         meshes.warnings.extend(one.warnings);
         let variants = one.variants.into_iter().map(|(primitive, choice)| ((number, primitive), choice));
         meshes.variants.extend(variants);
+        meshes.unknown.extend(one.unknown.into_iter().map(|(primitive, kept)| ((number, primitive), kept)));
+        meshes.loose.extend(one.loose.map(|loose| (number, loose)));
+        for name in one.lost {
+            *meshes.lost.entry(name).or_default() += 1;
+        }
         meshes.list.push(one.mesh);
     }
     Ok(meshes)
@@ -55,6 +68,9 @@ struct OneMesh {
     mesh: Mesh,
     uses_default_material: bool,
     variants: Vec<(usize, Vec<Mapping>)>,
+    unknown: Vec<(usize, Unknown)>,
+    loose: Option<LooseMesh>,
+    lost: Vec<String>,
     warnings: Vec<Fault>,
 }
 
@@ -74,7 +90,8 @@ fn read(
     let mut uses_default_material = false;
     let mut corners = 0_usize;
     let mut target_counts = BTreeSet::new();
-    let (mut variants, mut kept) = (Vec::new(), 0);
+    let (mut variants, mut strange, mut lost, mut kept) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    let (mut loose, mut loose_left) = (LooseMesh::default(), max_elements);
     for primitive in item.objects("primitives")? {
         target_counts.insert(primitive.items("targets")?.len());
         let mode = primitive.size("mode")?.unwrap_or(4);
@@ -82,7 +99,8 @@ fn read(
             return Err(primitive.fault(format!("mode {mode} does not exist")));
         }
         if mode < 4 {
-            warnings.push(primitive.fault("points and lines are not shown; it was left out"));
+            let read = loose::read(&primitive, accessors, mode, materials.len(), &mut loose_left)?;
+            loose.primitives.push(read);
             continue;
         }
         let Some(attributes) = attribute_reader.read(&primitive, &mut warnings)? else {
@@ -113,7 +131,16 @@ fn read(
         if let Some(extension) = primitive.extension("KHR_materials_variants")? {
             variants.push((kept, read_mappings(&extension, materials.len())?));
         }
+        strange.push((kept, unknown(&primitive, &[])));
+        lost.extend(lost_attributes(&primitive)?);
         kept += 1;
+    }
+    strange.retain(|(_, unknown)| !unknown.is_empty());
+    match loose.primitives.len() {
+        0 => {}
+        count => warnings.push(item.fault(format!(
+            "{count} primitives of points or lines are not rendered and only kept for exports"
+        ))),
     }
     warnings.extend(repair_warnings(item, &builder.repairs));
     if target_counts.len() > 1 {
@@ -126,11 +153,26 @@ fn read(
     if let Some(weights) = read_weights(item, mesh.data.morph.len(), &mut warnings)? {
         mesh.default_weights = weights;
     }
-    Ok(OneMesh { mesh, uses_default_material, variants, warnings })
+    if mesh.primitives.is_empty() {
+        loose.weights = item.raw("weights").cloned();
+    }
+    let loose = Some(loose).filter(|loose| !loose.primitives.is_empty());
+    Ok(OneMesh { mesh, uses_default_material, variants, unknown: strange, loose, lost, warnings })
+}
+
+/// Attributes of a primitive of triangles that are not read.
+fn lost_attributes(primitive: &Item<'_>) -> Result<Vec<String>, Fault> {
+    let Some(attributes) = primitive.child("attributes")? else {
+        return Ok(Vec::new());
+    };
+    let is_read =
+        |name: &str| BASE.contains(&name) || name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_");
+    let names = attributes.object()?.keys().filter(|name| !is_read(name));
+    Ok(names.map(|name| format!("the attribute {name} of triangles")).collect())
 }
 
 /// What variants of materials choose for a primitive.
-fn read_mappings(extension: &Item<'_>, materials: usize) -> Result<Vec<Mapping>, Fault> {
+pub(super) fn read_mappings(extension: &Item<'_>, materials: usize) -> Result<Vec<Mapping>, Fault> {
     let mapping = |item: &Item<'_>| {
         Ok(Mapping {
             material: item.required_index("material", materials, "material")?,

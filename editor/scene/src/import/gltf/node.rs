@@ -1,16 +1,18 @@
 //! The node tree with lights and cameras, in double precision.
-//! In: JSON of the chosen scene. Out: parts in depth-first order. Deep trees are walked without recursion.
+//! In: JSON. Out: parts in depth-first order, those of the default scene first. Deep trees are walked without recursion.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
 
 use super::accessor::Accessors;
+use super::foreign::carried;
 use super::json::{Fault, Item, held};
-use super::mesh::read_weights;
+use super::mesh::{Meshes, read_weights};
 use crate::assets::{Camera, Environment, Light, LightKind, Mesh, Projection};
+use crate::foreign::LooseMesh;
 use crate::ids::MeshId;
-use crate::prefab::PartNode;
+use crate::prefab::{PartNode, SourceScene};
 use crate::transform::{Local, Trs};
 
 /// Radius of point and spot lights whose file gives none, metres: hard shadows, as other programs show them.
@@ -24,70 +26,127 @@ const DEFAULT_NEAR_M: f32 = 0.01;
 /// A rotation this close to unit length is left as it is, bit for bit.
 const UNIT_TOLERANCE: f64 = 1e-14;
 
-/// The tree of a scene.
+/// The tree of a file.
 #[derive(Default)]
 pub(super) struct Tree {
     pub parts: Vec<PartNode>,
-    /// Index of the part that a node of the file became; `None` when the scene does not have it.
+    /// Index of the part that a node of the file became.
     pub part_of_node: Vec<Option<u32>>,
-    pub environment: Option<Environment>,
+    /// The scenes of the file; one of all roots where it has none.
+    pub scenes: Vec<SourceScene>,
+    pub default_scene: usize,
+    /// Which light of the file a part carries.
+    pub light_of: BTreeMap<u32, usize>,
+    /// Which camera likewise.
+    pub camera_of: BTreeMap<u32, usize>,
+    /// Meshes of nothing but points and lines, by the part that places them.
+    pub loose_parts: BTreeMap<u32, usize>,
+    /// What of parts cannot be kept, in words.
+    pub lost: Vec<&'static str>,
     /// How many GPU instances follow a part that has some.
     pub instanced: BTreeMap<u32, u32>,
     pub warnings: Vec<Fault>,
 }
 
-/// Reads the default scene, else the first, else all nodes.
-pub(super) fn read_scene(root: &Item<'_>, accessors: &Accessors<'_>, meshes: &[Mesh]) -> Result<Tree, Fault> {
+/// Reads all nodes: those of the default scene, else of the first, then those of the others, then those of none.
+pub(super) fn read_scenes(
+    root: &Item<'_>,
+    accessors: &Accessors<'_>,
+    meshes: &Meshes,
+) -> Result<Tree, Fault> {
     let nodes = root.objects("nodes")?;
-    let scene = chosen_scene(root)?;
     let children: Vec<Vec<usize>> =
         nodes.iter().map(|node| node.indices("children", nodes.len(), "node")).collect::<Result<_, _>>()?;
-    let roots = match &scene {
-        Some(scene) => scene.indices("nodes", nodes.len(), "node")?,
-        None => roots_of(&children),
-    };
-    let reader = Reader {
-        accessors,
-        meshes,
-        lights: match root.extension("KHR_lights_punctual")? {
-            Some(extension) => extension.objects("lights")?,
-            None => Vec::new(),
-        },
-        cameras: root.objects("cameras")?,
-    };
-    let mut tree =
-        Tree { environment: scene.as_ref().map(read_environment).transpose()?.flatten(), ..Tree::default() };
-    let scenes = root.items("scenes")?.len();
-    if let Some(scene) = scene.filter(|_| scenes > 1) {
-        tree.warnings
-            .push(scene.fault(format!("of {scenes} scenes this one is read, the others are left out")));
-    }
-    tree.part_of_node = vec![None; nodes.len()];
-    let mut stack: Vec<(usize, Option<u32>)> = roots.iter().rev().map(|&n| (n, None)).collect();
-    let mut seen = vec![false; nodes.len()];
-    while let Some((index, parent)) = stack.pop() {
-        let (Some(item), Some(seen)) = (nodes.get(index), seen.get_mut(index)) else {
-            continue;
-        };
-        if std::mem::replace(seen, true) {
-            return Err(item.fault("the scene names it twice"));
+    let (lights, cameras) = carried(root)?;
+    let items = root.objects("scenes")?;
+    let default_scene = root.index("scene", items.len(), "scene")?.unwrap_or(0);
+    let part_of_node = vec![None; nodes.len()];
+    let tree = Tree { default_scene, part_of_node, ..Tree::default() };
+    let reader = Reader { accessors, meshes: &meshes.list, loose: &meshes.loose, lights, cameras };
+    let mut walk = Walk { reader, nodes, children, tree };
+    let mut scenes = vec![SourceScene::default(); items.len()];
+    let others = (0..items.len()).filter(|&place| place != default_scene);
+    for place in std::iter::once(default_scene).chain(others) {
+        if let (Some(item), Some(scene)) = (items.get(place), scenes.get_mut(place)) {
+            *scene = walk.scene(item, place == default_scene)?;
         }
-        let part = tree.parts.len() as u32;
-        if let Some(place) = tree.part_of_node.get_mut(index) {
-            *place = Some(part);
-        }
-        reader.read_node(item, parent, &mut tree)?;
-        let below = children.get(index).into_iter().flatten().rev();
-        stack.extend(below.map(|&child| (child, Some(part))));
     }
-    Ok(tree)
+    let mut all = SourceScene::default();
+    for node in roots_of(&walk.children) {
+        if walk.part_of(node).is_none() {
+            all.roots.push(walk.subtree(node, false)?);
+        }
+    }
+    if scenes.is_empty() {
+        scenes.push(all);
+    }
+    walk.tree.scenes = scenes;
+    Ok(walk.tree)
 }
 
-/// The default scene, else the first.
-pub(super) fn chosen_scene<'a>(root: &Item<'a>) -> Result<Option<Item<'a>>, Fault> {
-    let mut scenes = root.objects("scenes")?;
-    let index = root.index("scene", scenes.len(), "scene")?.unwrap_or(0);
-    Ok((index < scenes.len()).then(|| scenes.swap_remove(index)))
+/// Reads node by node.
+struct Walk<'a> {
+    reader: Reader<'a>,
+    nodes: Vec<Item<'a>>,
+    children: Vec<Vec<usize>>,
+    tree: Tree,
+}
+
+impl Walk<'_> {
+    fn part_of(&self, node: usize) -> Option<u32> {
+        self.tree.part_of_node.get(node).copied().flatten()
+    }
+
+    /// A scene with those of its nodes that were not read yet. `strict`: no node may be in it twice.
+    fn scene(&mut self, item: &Item<'_>, strict: bool) -> Result<SourceScene, Fault> {
+        let environment = read_environment(item)?;
+        let mut scene = SourceScene { name: item.name()?, environment, ..SourceScene::default() };
+        let mut seen = BTreeSet::new();
+        for node in item.indices("nodes", self.nodes.len(), "node")? {
+            let root = match self.part_of(node) {
+                None => self.subtree(node, strict)?,
+                Some(part) => part,
+            };
+            let is_root = self.tree.parts.get(root as usize).is_some_and(|part| part.parent.is_none());
+            if is_root && seen.insert(root) {
+                scene.roots.push(root);
+            } else {
+                self.twice(node, strict)?;
+            }
+        }
+        Ok(scene)
+    }
+
+    /// A node with all below it; gives its part.
+    fn subtree(&mut self, node: usize, strict: bool) -> Result<u32, Fault> {
+        let top = self.tree.parts.len() as u32;
+        let mut stack = vec![(node, None)];
+        while let Some((node, parent)) = stack.pop() {
+            if self.part_of(node).is_some() {
+                self.twice(node, strict)?;
+                continue;
+            }
+            let part = self.tree.parts.len() as u32;
+            let (Some(item), Some(place)) = (self.nodes.get(node), self.tree.part_of_node.get_mut(node))
+            else {
+                continue;
+            };
+            *place = Some(part);
+            self.reader.read_node(item, parent, &mut self.tree)?;
+            let below = self.children.get(node).into_iter().flatten().rev();
+            stack.extend(below.map(|&child| (child, Some(part))));
+        }
+        Ok(top)
+    }
+
+    fn twice(&mut self, node: usize, strict: bool) -> Result<(), Fault> {
+        let Some(item) = self.nodes.get(node) else { return Ok(()) };
+        if strict {
+            return Err(item.fault("the scene names it twice"));
+        }
+        self.tree.warnings.push(item.fault("the scenes name it in two places; it is read at the first"));
+        Ok(())
+    }
 }
 
 fn roots_of(children: &[Vec<usize>]) -> Vec<usize> {
@@ -113,6 +172,7 @@ fn read_environment(scene: &Item<'_>) -> Result<Option<Environment>, Fault> {
 struct Reader<'a> {
     accessors: &'a Accessors<'a>,
     meshes: &'a [Mesh],
+    loose: &'a BTreeMap<usize, LooseMesh>,
     lights: Vec<Item<'a>>,
     cameras: Vec<Item<'a>>,
 }
@@ -120,20 +180,31 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// Adds a node, and a part below it for each GPU instance.
     fn read_node(&self, item: &Item<'_>, parent: Option<u32>, tree: &mut Tree) -> Result<(), Fault> {
-        let mesh = item
-            .index("mesh", self.meshes.len(), "mesh")?
+        let part = tree.parts.len() as u32;
+        let named = item.index("mesh", self.meshes.len(), "mesh")?;
+        let mesh = named
             .filter(|&mesh| self.meshes.get(mesh).is_some_and(|m| !m.primitives.is_empty()))
             .map(|mesh| MeshId(mesh as u64));
-        let light = match item.extension("KHR_lights_punctual")? {
-            Some(extension) => {
-                let index = extension.required_index("light", self.lights.len(), "light")?;
-                self.lights.get(index).map(|light| read_light(light, item, &mut tree.warnings)).transpose()?
-            }
-            None => None,
-        };
+        if let Some(loose) = named.filter(|named| mesh.is_none() && self.loose.contains_key(named)) {
+            tree.loose_parts.insert(part, loose);
+            let more = [
+                (item.raw("weights").is_some(), "the weights of a node of points or lines"),
+                (item.raw("skin").is_some(), "the skin of a node of points or lines"),
+                (
+                    item.extension("EXT_mesh_gpu_instancing")?.is_some(),
+                    "the GPU instances of points or lines",
+                ),
+            ];
+            tree.lost.extend(more.into_iter().filter(|(has, _)| *has).map(|(_, what)| what));
+        }
+        let light = self.read_light_of(item, part, tree)?;
         let camera = match item.index("camera", self.cameras.len(), "camera")? {
             Some(index) => match self.cameras.get(index) {
-                Some(camera) => read_camera(camera, &mut tree.warnings)?,
+                Some(camera) => {
+                    let read = read_camera(camera, &mut tree.warnings)?;
+                    tree.camera_of.extend(read.is_some().then_some((part, index)));
+                    read
+                }
                 None => None,
             },
             None => None,
@@ -142,7 +213,6 @@ impl Reader<'_> {
             Some(extension) => extension.bool_or("visible", true)?,
             None => true,
         };
-        let part = tree.parts.len() as u32;
         let instances = match (mesh, item.extension("EXT_mesh_gpu_instancing")?) {
             (Some(_), Some(extension)) => self.read_instances(&extension)?,
             _ => None,
@@ -182,6 +252,15 @@ impl Reader<'_> {
             true => Err(item.fault(format!("more than {MAX_PARTS} nodes are not read"))),
             false => Ok(()),
         }
+    }
+
+    fn read_light_of(&self, item: &Item<'_>, part: u32, tree: &mut Tree) -> Result<Option<Light>, Fault> {
+        let Some(extension) = item.extension("KHR_lights_punctual")? else {
+            return Ok(None);
+        };
+        let index = extension.required_index("light", self.lights.len(), "light")?;
+        tree.light_of.insert(part, index);
+        self.lights.get(index).map(|light| read_light(light, item, &mut tree.warnings)).transpose()
     }
 
     fn read_instances(&self, extension: &Item<'_>) -> Result<Option<Vec<Trs>>, Fault> {

@@ -10,13 +10,14 @@ use super::node::Tree;
 use crate::assets::Mesh;
 use crate::prefab::Skin;
 
-/// Reads the skins and gives them to the parts of the tree that they bend.
+/// Reads the skins and gives them to the parts of the tree that they bend. Gives their places in that list too, `None` for
+/// those that were left out.
 pub(super) fn read_all(
     root: &Item<'_>,
     accessors: &Accessors<'_>,
     meshes: &[Mesh],
     tree: &mut Tree,
-) -> Result<Vec<Skin>, Fault> {
+) -> Result<(Vec<Skin>, Vec<Option<u32>>), Fault> {
     let items = root.objects("skins")?;
     let mut skins = Vec::new();
     let mut place_of: Vec<Option<u32>> = Vec::new();
@@ -54,7 +55,7 @@ pub(super) fn read_all(
             Some(_) => part.skin = Some(skin),
         }
     }
-    Ok(skins)
+    Ok((skins, place_of))
 }
 
 /// `None` for a mesh without joints.

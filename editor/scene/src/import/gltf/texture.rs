@@ -10,8 +10,10 @@ use rayon::prelude::*;
 use super::super::image::{Pixels, decode, placeholder};
 use super::accessor::View;
 use super::buffers::{Buffers, read_image_uri};
+use super::foreign::unknown;
 use super::json::{Fault, Item};
 use crate::assets::{Sampler, Texture, Wrap};
+use crate::foreign::KeptTexture;
 use crate::ids::TextureId;
 
 /// Extensions that give a texture an image in a format that glTF itself does not know.
@@ -33,6 +35,8 @@ struct Source {
     image: Option<usize>,
     fallback: Option<usize>,
     sampler: Sampler,
+    /// Place of the sampler in the file.
+    sampler_item: Option<usize>,
 }
 
 /// Collects what materials ask for, in order of first use.
@@ -41,6 +45,9 @@ pub(super) struct TextureTable {
     sources: Vec<(Source, String)>,
     ids: HashMap<Key, TextureId>,
     wanted: Vec<(Key, String)>,
+    /// Which glTF texture each of these was made for first.
+    first: Vec<usize>,
+    used: BTreeSet<usize>,
 }
 
 impl TextureTable {
@@ -58,15 +65,18 @@ impl TextureTable {
                 }
             }
             let sampler = texture.index("sampler", samplers.len(), "sampler")?;
+            let sampler_item = sampler;
             let sampler = sampler.and_then(|s| samplers.get(s)).copied();
             let source = Source {
                 image: extended.or(plain),
                 fallback: plain.filter(|_| extended.is_some()),
                 sampler: sampler.unwrap_or_default(),
+                sampler_item,
             };
             sources.push((source, texture.place().to_owned()));
         }
-        Ok(Self { sources, ids: HashMap::new(), wanted: Vec::new() })
+        let (ids, wanted, first, used) = Default::default();
+        Ok(Self { sources, ids, wanted, first, used })
     }
 
     /// Number of textures in the file.
@@ -76,7 +86,8 @@ impl TextureTable {
 
     /// The id of a glTF texture read as colour (`srgb`) or as data.
     pub fn want(&mut self, texture: usize, srgb: bool) -> TextureId {
-        let (Source { image, fallback, sampler }, place) = match self.sources.get(texture) {
+        self.used.insert(texture);
+        let (Source { image, fallback, sampler, .. }, place) = match self.sources.get(texture) {
             Some((source, place)) => (*source, place.clone()),
             None => (Source::default(), format!("/textures/{texture}")),
         };
@@ -84,8 +95,40 @@ impl TextureTable {
         let next = TextureId(self.wanted.len() as u64);
         *self.ids.entry(key).or_insert_with(|| {
             self.wanted.push((key, place));
+            self.first.push(texture);
             next
         })
+    }
+
+    /// What is not read of the file, with its number.
+    pub fn unused(&self) -> Option<(String, usize)> {
+        let count = self.sources.len().saturating_sub(self.used.len());
+        (count > 0).then(|| ("a texture that no material has".to_owned(), count))
+    }
+
+    /// What is not known of the textures that are used, and of their images and samplers.
+    pub fn kept(&self, root: &Item<'_>) -> Result<BTreeMap<usize, KeptTexture>, Fault> {
+        let (textures, images, samplers) =
+            (root.objects("textures")?, root.objects("images")?, root.objects("samplers")?);
+        let mut kept = BTreeMap::new();
+        for (place, &texture) in self.first.iter().enumerate() {
+            let Some((item, (source, _))) = textures.get(texture).zip(self.sources.get(texture)) else {
+                continue;
+            };
+            let sampler = source.sampler_item.and_then(|index| samplers.get(index));
+            let image = source.image.and_then(|index| images.get(index));
+            let one = KeptTexture {
+                name: item.name()?,
+                unknown: unknown(item, &[]),
+                image: image.map(|image| unknown(image, &[])).unwrap_or_default(),
+                sampler_name: sampler.map_or_else(|| Ok(String::new()), Item::name)?,
+                sampler: sampler.map(|sampler| unknown(sampler, &[])).unwrap_or_default(),
+            };
+            if one != KeptTexture::default() {
+                kept.insert(place, one);
+            }
+        }
+        Ok(kept)
     }
 
     /// Decodes every image that is used, each once, on all cores.

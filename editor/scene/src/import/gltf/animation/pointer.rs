@@ -1,10 +1,13 @@
 //! What a pointer of `KHR_animation_pointer` means: nodes, meshes, materials, lights and cameras, by their places in
 //! the file. In: the pointer. Out: what channels change, or nothing where that cannot be animated.
 
+use super::super::check;
+use super::super::foreign::numbers_of;
 use super::super::json::{Fault, Item};
 use super::{Reader, Targets};
 use crate::animation::{ChannelPath, Property};
 use crate::assets::{Camera, Light, Material};
+use crate::foreign::{KeptChannel, Pointed};
 use crate::ids::MaterialId;
 
 const LIGHTS: &str = "/extensions/KHR_lights_punctual/lights/";
@@ -51,6 +54,50 @@ impl Reader<'_> {
         Ok(None)
     }
 
+    /// A channel of a pointer that cannot be played, for an export to write it again; `None` where it points at nothing
+    /// that an export has.
+    pub(super) fn unplayed(
+        &self,
+        sampler: &Item<'_>,
+        target: &Item<'_>,
+    ) -> Result<Option<KeptChannel>, Fault> {
+        let extension = target.extension("KHR_animation_pointer")?;
+        let pointer = match extension.filter(|_| target.raw("path").is_some_and(|path| path == "pointer")) {
+            Some(extension) => extension.text("pointer")?.unwrap_or_default(),
+            None => return Ok(None),
+        };
+        let Some((of, rest)) = self.place_of(pointer) else { return Ok(None) };
+        Ok(Some(KeptChannel {
+            of,
+            pointer: rest.to_owned(),
+            interpolation: sampler.text("interpolation")?.map(str::to_owned),
+            input: self.accessors.numbers(sampler.required_size("input")?, false)?,
+            output: self.accessors.numbers(sampler.required_size("output")?, false)?,
+        }))
+    }
+
+    /// What a pointer points into, and what follows.
+    fn place_of<'p>(&self, pointer: &'p str) -> Option<(Pointed, &'p str)> {
+        if let Some((node, rest)) = split(pointer, "/nodes/") {
+            return Some((Pointed::Part(self.tree.part_of_node.get(node).copied().flatten()?), rest));
+        }
+        if let Some((mesh, rest)) = split(pointer, "/meshes/") {
+            return (mesh < self.meshes.len()).then_some((Pointed::Mesh(mesh), rest));
+        }
+        if let Some((material, rest)) = split(pointer, "/materials/") {
+            return (material < self.materials.len()).then_some((Pointed::Material(material), rest));
+        }
+        if let Some((light, rest)) = split(pointer, LIGHTS) {
+            return Some((Pointed::Light(*numbers_of(&self.tree.light_of).get(&light)?), rest));
+        }
+        if let Some((camera, rest)) = split(pointer, "/cameras/") {
+            return Some((Pointed::Camera(*numbers_of(&self.tree.camera_of).get(&camera)?), rest));
+        }
+        let rest = pointer.strip_prefix("/extensions/")?;
+        let is_kept = !check::is_read(rest.split('/').next()?);
+        is_kept.then_some((Pointed::File, pointer.strip_prefix('/')?))
+    }
+
     /// The parts of the scene whose nodes are wanted, each with the path.
     fn parts(
         &self,
@@ -65,6 +112,7 @@ impl Reader<'_> {
                 targets.push((*part, path));
             }
         }
+        targets.sort_unstable();
         Ok(targets)
     }
 }

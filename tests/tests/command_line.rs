@@ -202,6 +202,34 @@ fn a_variant_of_materials_is_chosen_by_name() {
 }
 
 #[test]
+fn a_scene_is_chosen_by_name_or_number() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut model: Value = serde_json::from_str(&cube(false)).expect("JSON");
+    model["scenes"] =
+        serde_json::json!([{"name": "full", "nodes": model["scenes"][0]["nodes"]}, {"nodes": []}]);
+    for scene in [0, 1] {
+        let radiance = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]][scene];
+        model["scenes"][scene]["extras"] = serde_json::json!({"environment": {"constantRadiance": radiance}});
+    }
+    std::fs::write(folder.path().join("cube.gltf"), model.to_string()).expect("a file");
+    let corner = |more: &[&str]| {
+        let run = render(folder.path(), "cube.gltf", &[&["-o", "a.png", "--samples", "2"], more].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        image::open(folder.path().join("a.png")).expect("the PNG").to_rgb8().get_pixel(0, 0).0
+    };
+    let is_green = |[red, green, _]: [u8; 3]| green > 150 && red < 50;
+    let is_red = |[red, green, _]: [u8; 3]| red > 150 && green < 50;
+    assert!(is_red(corner(&[])) && is_red(corner(&["--scene", "full"])) && is_red(corner(&["--scene", "1"])));
+    assert!(is_green(corner(&["--scene", "scene 2"])) && is_green(corner(&["--scene", "2"])));
+    let run = render(folder.path(), "cube.gltf", &["-o", "a.png", "--scene", "night"]);
+    assert!(
+        run.code == Some(1) && run.stderr.contains("no scene 'night'; there is: full, scene 2"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
 fn a_picture_takes_the_place_of_no_source() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("cube.gltf"), cube(false)).expect("a file");

@@ -354,7 +354,7 @@ impl Document {
             .into_iter()
             .flat_map(|prefab| prefab.children(target.part))
             .map(|part| Target::part(target.node, part))
-            .filter(|&part| !self.is_absent(part));
+            .filter(|&part| target.part.is_some() || !self.is_absent(part));
         let nodes = match target.part {
             None => node.children.as_slice(),
             Some(_) => &[],

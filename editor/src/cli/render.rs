@@ -85,6 +85,11 @@ pub(super) fn run(
     if session.document().is_source(&args.output) {
         bail!("{}: is a source of this scene; choose another name", args.output.display());
     }
+    if let Some(name) = &args.scene {
+        choose_scene(&mut session, name).with_context(|| args.file.display().to_string())?;
+        let aspect = f64::from(args.size[0]) / f64::from(args.size[1]);
+        session.set_camera(ViewCamera::of_document(session.document(), None, aspect));
+    }
     if let Some(name) = &args.variant {
         choose_variant(&mut session, name).with_context(|| args.file.display().to_string())?;
     }
@@ -168,6 +173,27 @@ fn picture(
         );
     }
     Ok(())
+}
+
+/// Shows the scene of this name, or number from 1, of all instances whose file has it.
+fn choose_scene(session: &mut Session, name: &str) -> anyhow::Result<()> {
+    let document = session.document();
+    let number = name.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+    let (mut edits, mut known) = (Vec::new(), BTreeSet::new());
+    for (node, prefab) in
+        document.nodes().filter_map(|(id, node)| Some((id, document.prefab(node.prefab()?)?)))
+    {
+        let names = prefab.scene_names();
+        let scene = names.iter().find(|known| *known == name).or_else(|| names.get(number?));
+        edits.extend(scene.cloned().map(|scene| Edit::SetScene { node, scene: Some(scene) }));
+        known.extend(names);
+    }
+    if edits.is_empty() {
+        let known: Vec<String> = known.into_iter().collect();
+        let known = if known.is_empty() { String::from("the file has none") } else { known.join(", ") };
+        bail!("no scene '{name}'; there is: {known}");
+    }
+    Ok(session.push(Edit::batch("chose a scene", edits))?)
 }
 
 /// Shows all instances that have a variant of materials of this name in it.

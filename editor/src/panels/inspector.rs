@@ -68,6 +68,14 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
             cx.push(Edit::SetVisible { target, visible: !visible });
         }
     });
+    let document = cx.session.document();
+    if document.driven(target).visibility {
+        let shown = document.posed_visible(target) == Some(true);
+        ui.horizontal(|ui| {
+            ui.weak(if shown { "A clip shows it now." } else { "A clip hides it now." });
+            rest_pose_mark(ui);
+        });
+    }
     let others = cx.state.selection.targets().len() - 1;
     if others > 0 {
         ui.weak(format!("and {others} more selected; the fields change the one shown"));
@@ -236,8 +244,29 @@ pub(super) fn rest_pose_mark(ui: &mut Ui) {
     );
 }
 
+/// What a clip makes of something at the time that is shown, above the fields of the rest pose.
+fn posed_fields(ui: &mut Ui, body: impl FnOnce(&mut Ui)) {
+    ui.push_id("posed", |ui| {
+        ui.weak("At the time that is shown, a clip sets:");
+        ui.add_enabled_ui(false, body);
+    });
+    ui.add_space(4.0);
+    rest_pose_mark(ui);
+}
+
 fn light_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Light) {
+    let document = cx.session.document();
+    if let Some(mut posed) = document.posed_light(target).filter(|_| document.driven(target).light) {
+        posed_fields(ui, |ui| light_fields(ui, &mut posed));
+    }
     let mut light = old;
+    light_fields(ui, &mut light);
+    if light != old {
+        cx.push(Edit::SetLight { target, light });
+    }
+}
+
+fn light_fields(ui: &mut Ui, light: &mut Light) {
     field(ui, "Kind", "What the light looks like from afar", |ui| kind_menu(ui, &mut light.kind));
     field(ui, "Colour", "Linear colour, multiplied by the intensity", |ui| {
         let mut rgb = light.color.to_array();
@@ -283,9 +312,6 @@ fn light_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Light) {
             let tip = "Half the angle under which the light is seen; the sun has 0.27 degrees. Zero gives hard shadows";
             angle_field(ui, "Angular radius", tip, angular_radius_rad, 0.0, 45.0);
         }
-    }
-    if light != old {
-        cx.push(Edit::SetLight { target, light });
     }
 }
 
@@ -365,7 +391,27 @@ fn angle_field(ui: &mut Ui, name: &str, tip: &str, angle_rad: &mut f32, low: f32
 }
 
 fn camera_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Camera) {
+    let document = cx.session.document();
+    if let Some(mut posed) = document.posed_camera(target).filter(|_| document.driven(target).camera) {
+        posed_fields(ui, |ui| camera_fields(ui, &mut posed));
+    }
     let mut camera = old;
+    camera_fields(ui, &mut camera);
+    if camera != old {
+        cx.push(Edit::SetCamera { target, camera });
+    }
+    let chosen = cx.session.document().main_camera().is_some_and(|main| main.target == target);
+    ui.horizontal(|ui| {
+        let button =
+            egui::Button::new(format!("{}  Render with this camera", icon::APERTURE)).selected(chosen);
+        let tip = "The command line and the 0 key use this camera when none is named";
+        if ui.add(button).on_hover_text(tip).clicked() && !chosen {
+            cx.push(Edit::SetDefaultCamera(Some(target)));
+        }
+    });
+}
+
+fn camera_fields(ui: &mut Ui, camera: &mut Camera) {
     match &mut camera.projection {
         Projection::Perspective { yfov_rad } => {
             angle_field(
@@ -398,18 +444,6 @@ fn camera_ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, old: Camera) {
                 .max_decimals(5)
                 .suffix(" m"),
         );
-    });
-    if camera != old {
-        cx.push(Edit::SetCamera { target, camera });
-    }
-    let chosen = cx.session.document().main_camera().is_some_and(|main| main.target == target);
-    ui.horizontal(|ui| {
-        let button =
-            egui::Button::new(format!("{}  Render with this camera", icon::APERTURE)).selected(chosen);
-        let tip = "The command line and the 0 key use this camera when none is named";
-        if ui.add(button).on_hover_text(tip).clicked() && !chosen {
-            cx.push(Edit::SetDefaultCamera(Some(target)));
-        }
     });
 }
 

@@ -5,6 +5,7 @@ use caustica_scene::{AlphaMode, Edit, Material, MaterialEntry, MaterialId, Shadi
 use egui::{DragValue, RichText, Slider, Ui};
 use egui_phosphor::regular as icon;
 
+use super::inspector::rest_pose_mark;
 use super::material_lobes::{dispersion_field, glossiness_fields, lobe_fields};
 use super::{Cx, field, section};
 
@@ -40,6 +41,9 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
         let name = if old.name.is_empty() { format!("material {}", id.0) } else { old.name.clone() };
         ui.push_id(id, |ui| {
             section(ui, &format!("Material: {name}"), |ui| {
+                if cx.session.document().is_material_driven(id) {
+                    rest_pose_mark(ui);
+                }
                 edit_material(cx, ui, id, &old);
                 own_copy(cx, ui, target, primitive as u32, id, &old);
             });

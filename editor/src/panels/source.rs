@@ -1,4 +1,4 @@
-//! The source of an instance: its file, the variant of its materials, and what it shares with other instances.
+//! The source of an instance: its file, the scene and the variant of materials that it shows, and what it shares with other instances.
 //! Enters: the document. Leaves: edits, and actions that read files.
 
 use caustica_scene::{Edit, NodeKind, OverrideField, PrefabId, Target};
@@ -20,11 +20,15 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
     let folder = cx.session.path().and_then(std::path::Path::parent);
     let shown = folder.and_then(|folder| prefab.source.strip_prefix(folder).ok()).unwrap_or(&prefab.source);
     let (source, missing, variants) = (shown.display().to_string(), prefab.missing, prefab.variants());
+    let (scenes, default_scene) = (prefab.scene_names(), prefab.default_scene());
     section(ui, "Source", |ui| {
         ui.label(RichText::new(&source).small()).on_hover_text("The file that this instance shows");
         if missing {
             let message = "The file was not found: nothing is shown in its place.";
             ui.colored_label(ui.visuals().error_fg_color, message);
+        }
+        if scenes.len() > 1 {
+            scene_field(cx, ui, target, &scenes, default_scene);
         }
         if !variants.is_empty() {
             variant_field(cx, ui, target, &variants);
@@ -32,6 +36,25 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui, target: Target) {
         file_buttons(cx, ui, id);
         if target.part.is_some() {
             follow_button(cx, ui, target);
+        }
+    });
+}
+
+/// A choice among several scenes of a file.
+fn scene_field(cx: &mut Cx<'_>, ui: &mut Ui, target: Target, scenes: &[String], default_scene: usize) {
+    field(ui, "Scene", "Which of the scenes in the file this instance shows", |ui| {
+        let old = cx.session.document().scene_of(target.node).map(str::to_owned);
+        let mut chosen = old.clone();
+        let by_itself = format!("Default ({})", scenes.get(default_scene).map_or("", String::as_str));
+        let text = chosen.clone().unwrap_or_else(|| by_itself.clone());
+        egui::ComboBox::from_id_salt("scene").selected_text(text).show_ui(ui, |ui| {
+            ui.selectable_value(&mut chosen, None, by_itself);
+            for name in scenes {
+                ui.selectable_value(&mut chosen, Some(name.clone()), name);
+            }
+        });
+        if chosen != old {
+            cx.push(Edit::SetScene { node: target.node, scene: chosen });
         }
     });
 }

@@ -31,7 +31,7 @@ impl PartStates {
 
 impl Document {
     /// The own visibility of a node or part in the pose of the time that is shown; parents may still hide it.
-    pub(super) fn posed_visible(&self, target: Target) -> Option<bool> {
+    pub fn posed_visible(&self, target: Target) -> Option<bool> {
         match target.part {
             None => self.visible(target),
             Some(part) => Some(self.slots.get(&target.node)?.parts.posed_visible(part, self.part(target)?)),
@@ -50,6 +50,11 @@ impl Document {
         let camera = self.camera_of(target)?;
         let pose = self.slots.get(&target.node).map(|slot| &slot.parts.pose);
         Some(with_numbers(camera, pose.zip(target.part).and_then(|(pose, part)| pose.cameras.get(&part))))
+    }
+
+    /// Whether a clip sets something of a material at the time that is shown, up to date after [`Self::drain_changes`].
+    pub fn is_material_driven(&self, id: MaterialId) -> bool {
+        self.material_pose.contains_key(&id)
     }
 
     /// A material as the time that is shown has it, up to date after [`Self::drain_changes`]. Materials belong to no

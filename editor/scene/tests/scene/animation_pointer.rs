@@ -303,21 +303,53 @@ fn what_cannot_be_animated_is_named() {
     assert_eq!(imported.prefab.animations[0].channels.len(), 2);
 }
 
-/// What an export leaves out is said, and the rest of the clip is there.
+/// Every channel is in an export, those that are not played too; what a pointer needs to end somewhere is made.
 #[test]
-fn an_export_says_what_it_leaves_out() {
+fn an_export_has_every_channel() {
     let mut clip = Clip::new();
+    let shown = clip.file.accessor("SCALAR", 2, false, Data::U8(&[1, 0]));
+    clip.channel("/nodes/1/extensions/KHR_node_visibility/visible", "STEP", shown, 2);
+    clip.line("/cameras/0/perspective/yfov", "SCALAR", &[0.5, 0.75]);
+    let strength = "extensions/KHR_materials_emissive_strength/emissiveStrength";
+    clip.line(&format!("/materials/1/{strength}"), "SCALAR", &[1., 2.]);
+    clip.line("/cameras/0/orthographic/xmag", "SCALAR", &[1., 2.]);
+    clip.line("/nodes/4/extensions/ACME_dial/turn", "SCALAR", &[3., 4.]);
+    clip.line("/images/0/name", "SCALAR", &[3., 4.]);
+    clip.file.json["nodes"][4]["extensions"] = json!({"ACME_dial": {"turn": 3}});
     clip.line("/nodes/1/translation", "VEC3", &[0., 0., 0., 4., 0., 0.]);
     clip.line(&format!("{LIGHT}/intensity"), "SCALAR", &[10., 30.]);
     let (document, _) = clip.place();
     let folder = tempfile::tempdir().unwrap();
     let written = folder.path().join("out.glb");
     let exported = caustica_scene::export(&document, &written).unwrap();
-    let said = |warning: &caustica_scene::import::Warning| {
-        warning.message.contains("2 channels of visibility, lights")
-    };
-    assert!(exported.warnings.iter().any(said), "{:?}", exported.warnings);
+    let channels = exported.warnings.iter().find(|warning| warning.place == "animations");
+    assert_eq!(channels, None, "the image cannot be pointed at, which the import says");
     let again = load(&written, &ImportOptions::default()).unwrap();
-    assert_eq!(again.prefab.animations[0].channels.len(), 1);
-    assert!(matches!(document.node(document.roots()[0]).unwrap().kind, NodeKind::Prefab { .. }));
+    let NodeKind::Prefab { prefab, .. } = document.node(document.roots()[0]).unwrap().kind else { panic!() };
+    let before = &document.prefab(prefab).unwrap().animations[0].channels;
+    let after = &again.prefab.animations[0].channels;
+    assert_eq!((before.len(), after.len()), (6, 6), "the light is that of two lamps");
+    for (before, after) in before.iter().zip(after) {
+        assert_eq!((before.part, before.interpolation), (after.part, after.interpolation));
+        assert_eq!((&before.times_s, &before.values), (&after.times_s, &after.values));
+    }
+    let file = crate::export::json_of(&written);
+    let pointers: Vec<&str> = file["animations"][0]["channels"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|channel| channel["target"]["extensions"]["KHR_animation_pointer"]["pointer"].as_str())
+        .collect();
+    let visible = "/nodes/1/extensions/KHR_node_visibility/visible";
+    let material = format!("/materials/1/{strength}");
+    let intensity = format!("{LIGHT}/intensity");
+    let [camera, xmag, dial] =
+        ["/cameras/0/perspective/yfov", "/cameras/0/orthographic/xmag", "/nodes/4/extensions/ACME_dial/turn"];
+    assert_eq!(pointers, [visible, camera, &material, &intensity, xmag, dial]);
+    assert_eq!(file["materials"][1]["extensions"]["KHR_materials_emissive_strength"], json!({}));
+    assert_eq!(file["nodes"][1]["extensions"]["KHR_node_visibility"], json!({}));
+    let kept = again.warnings.iter().filter(|warning| warning.message.contains("animated; it is only kept"));
+    assert_eq!(kept.count(), 2, "{:?}", again.warnings);
+    let second = crate::export::exported(&crate::export::placed(again), folder.path(), "again.glb").0;
+    assert!(std::fs::read(written).unwrap() == std::fs::read(second).unwrap(), "a second export is the same");
 }

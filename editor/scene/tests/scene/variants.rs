@@ -56,3 +56,25 @@ fn a_variant_that_the_source_has_lost_is_kept_and_told_of() {
     let glow = scene.document.prefab(scene.prefab).unwrap().materials[1];
     assert_eq!(materials(&scene, scene.part(PLATE)), [glow, glow]);
 }
+
+#[test]
+fn two_variants_of_one_name_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = scene(folder.path());
+    let path = folder.path().join("twins.gltf");
+    let text = std::fs::read_to_string(folder.path().join("model.gltf")).unwrap();
+    std::fs::write(&path, text.replace(r#""name":"plain""#, r#""name":"glowing""#)).unwrap();
+    let edit = scene.document.reload_edit(scene.prefab, load(&path, &ImportOptions::default()).unwrap());
+    scene.document.apply(edit.unwrap()).unwrap();
+    let prefab = scene.document.prefab(scene.prefab).unwrap();
+    assert_eq!(prefab.variants(), ["glowing", "glowing#2"]);
+    let [red, glow] = prefab.materials[..] else { panic!("two materials") };
+    let plate = scene.part(PLATE);
+    for (variant, chosen) in [("glowing", [red, glow]), ("glowing#2", [glow, glow])] {
+        scene.document.apply(choose(variant)(&scene)).unwrap();
+        assert_eq!(materials(&scene, plate), chosen, "{variant}");
+    }
+    let exported = caustica_scene::export(&scene.document, &folder.path().join("out.glb")).unwrap();
+    let again = load(&exported.files[0], &ImportOptions::default()).unwrap();
+    assert_eq!(again.prefab.variants(), ["glowing", "glowing#2"], "as the source names them");
+}

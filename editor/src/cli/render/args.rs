@@ -42,6 +42,9 @@ pub(in crate::cli) struct RenderArgs {
     /// Name of the camera
     #[arg(long)]
     pub(super) camera: Option<String>,
+    /// Show this scene of the file: its name, or its number from 1
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(super) scene: Option<String>,
     /// Show every instance that has it in this variant of materials (KHR_materials_variants)
     #[arg(long, value_name = "NAME")]
     pub(super) variant: Option<String>,

@@ -150,11 +150,10 @@ fn read(
     }
     builder.name_targets(item.extra_texts("targetNames"));
     let mut mesh = builder.finish(item.name()?);
-    if let Some(weights) = read_weights(item, mesh.data.morph.len(), &mut warnings)? {
-        mesh.default_weights = weights;
-    }
-    if mesh.primitives.is_empty() {
+    if mesh.primitives.is_empty() && !loose.primitives.is_empty() {
         loose.weights = item.raw("weights").cloned();
+    } else if let Some(weights) = read_weights(item, mesh.data.morph.len(), &mut warnings)? {
+        mesh.default_weights = weights;
     }
     let loose = Some(loose).filter(|loose| !loose.primitives.is_empty());
     Ok(OneMesh { mesh, uses_default_material, variants, unknown: strange, loose, lost, warnings })

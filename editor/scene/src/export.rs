@@ -220,21 +220,9 @@ impl<'a> Writer<'a> {
         self.warn_about_clips(&tree, clips.left_out);
 
         let lists = std::mem::take(&mut self.buffer).finish();
-        let mut file = Object::new();
-        file.put("asset", self.asset(&sources));
-        let (shown, scenes) = self.scenes(&tree, &sources);
-        file.put("scene", shown);
-        file.put("scenes", scenes);
-        let mut lights = nodes.lights.pool.into_list();
-        lights.extend(sources.spare(|foreign| &foreign.spare_lights, &mut self.used));
         let mut cameras = nodes.cameras.pool.into_list();
         cameras.extend(sources.spare(|foreign| &foreign.spare_cameras, &mut self.used));
-        if !lights.is_empty() {
-            let mut object = Object::new();
-            object.put("lights", lights);
-            self.used.put(&mut file, "KHR_lights_punctual", object);
-        }
-        sources.put_file(&mut file, &mut self.used);
+        let mut file = self.top(&tree, &sources, nodes.lights);
         self.warn_about_lost(&sources);
         file.put_filled("extensionsUsed", self.used.names());
         for (name, list) in [
@@ -253,6 +241,24 @@ impl<'a> Writer<'a> {
             file.put_filled(name, list);
         }
         (file, lists.bytes)
+    }
+
+    /// What stands above the lists.
+    fn top(&mut self, tree: &Tree, sources: &Sources<'_>, lights: Carried) -> Object {
+        let mut file = Object::new();
+        file.put("asset", self.asset(sources));
+        let (shown, scenes) = self.scenes(tree, sources);
+        file.put("scene", shown);
+        file.put("scenes", scenes);
+        let mut lights = lights.pool.into_list();
+        lights.extend(sources.spare(|foreign| &foreign.spare_lights, &mut self.used));
+        if !lights.is_empty() {
+            let mut object = Object::new();
+            object.put("lights", lights);
+            self.used.put(&mut file, "KHR_lights_punctual", object);
+        }
+        sources.put_file(&mut file, &mut self.used);
+        file
     }
 
     fn materials(

@@ -49,8 +49,7 @@ pub(super) struct Tree {
 
 impl Tree {
     pub fn of(document: &Document, meshes: &Meshes<'_>) -> Self {
-        let mut tree = Self::default();
-        tree.whole = whole_file(document);
+        let mut tree = Self { whole: whole_file(document), ..Self::default() };
         let tops: Vec<Target> = match tree.whole {
             Some((node, prefab)) => {
                 tree.instances.push((node, prefab));

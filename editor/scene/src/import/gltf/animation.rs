@@ -15,14 +15,14 @@ use crate::transform::Local;
 
 mod pointer;
 
-/// Reads all animations in the order of the file; and the channels that can only be kept, by animation.
+/// Reads all animations in the order of the file.
 pub(super) fn read_all(
     root: &Item<'_>,
     accessors: &Accessors<'_>,
     meshes: &[Mesh],
     materials: &[Material],
     tree: &mut Tree,
-) -> Result<(Vec<Arc<Animation>>, BTreeMap<usize, Vec<KeptChannel>>), Fault> {
+) -> Result<(Vec<Arc<Animation>>, Unplayed), Fault> {
     let mut warnings = Vec::new();
     let nodes = root.objects("nodes")?;
     let reader = Reader { accessors, meshes, materials, nodes, tree };
@@ -37,6 +37,9 @@ pub(super) fn read_all(
     tree.warnings.append(&mut warnings);
     Ok((clips, kept))
 }
+
+/// Channels that can only be kept, by animation.
+type Unplayed = BTreeMap<usize, Vec<KeptChannel>>;
 
 struct Reader<'a> {
     accessors: &'a Accessors<'a>,

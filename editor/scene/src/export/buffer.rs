@@ -18,10 +18,20 @@ pub(super) enum Use {
     Vertices { set: usize },
     /// Indices of triangles.
     Indices,
-    /// Attributes of vertices that stand farther apart than they are long.
-    Padded { set: usize, stride: usize },
+    /// The same with bytes from one to the next, which is said, as a view may come to be that of several accessors.
+    Strided { set: usize, stride: usize },
     /// Key frames, matrices, images.
     Other,
+}
+
+impl Use {
+    /// With the bytes from one vertex to the next.
+    fn with_stride(self, stride: usize) -> Self {
+        match self {
+            Self::Vertices { set } => Self::Strided { set, stride },
+            other => other,
+        }
+    }
 }
 
 /// Views, accessors and bytes.
@@ -62,7 +72,7 @@ impl Buffer {
         view.put("byteLength", bytes.len());
         match usage {
             Use::Vertices { .. } => view.put("target", 34962),
-            Use::Padded { stride, .. } => {
+            Use::Strided { stride, .. } => {
                 view.put("byteStride", stride);
                 view.put("target", 34962);
             }
@@ -78,7 +88,7 @@ impl Buffer {
     /// An accessor of floats. `bounds`: with the smallest and largest value of each component.
     pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], bounds: bool, usage: Use) -> usize {
         let bytes: Vec<u8> = values.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
-        let view = self.view(&bytes, usage);
+        let view = self.view(&bytes, usage.with_stride(N * 4));
         self.float_accessor(values, bounds, Some(view))
     }
 
@@ -95,9 +105,9 @@ impl Buffer {
                     filled
                 };
                 let bytes: Vec<u8> = numbers.bytes.chunks(size.max(1)).flat_map(filled).collect();
-                self.view(&bytes, Use::Padded { set, stride })
+                self.view(&bytes, Use::Strided { set, stride })
             }
-            _ => self.view(&numbers.bytes, usage),
+            _ => self.view(&numbers.bytes, usage.with_stride(size)),
         };
         let mut accessor = accessor(Some(view), numbers.component, numbers.kind, numbers.count);
         if numbers.normalized {
@@ -140,7 +150,7 @@ impl Buffer {
     /// An accessor of four joints a vertex.
     pub fn joints(&mut self, values: &[[u16; 4]], usage: Use) -> usize {
         let bytes: Vec<u8> = values.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
-        let view = self.view(&bytes, usage);
+        let view = self.view(&bytes, usage.with_stride(8));
         self.accessors.place(accessor(Some(view), 5123, "VEC4", values.len()))
     }
 

@@ -21,7 +21,7 @@ const EYE: u32 = 4;
 
 const LIGHT: &str = "/extensions/KHR_lights_punctual/lights/0";
 
-struct Clip {
+pub struct Clip {
     file: GltfFile,
     channels: Vec<Value>,
     samplers: Vec<Value>,
@@ -80,7 +80,7 @@ impl Clip {
         load(&self.file.write(folder), &ImportOptions::default()).unwrap()
     }
 
-    fn place(self) -> (Document, NodeId) {
+    pub fn place(self) -> (Document, NodeId) {
         let folder = tempfile::tempdir().unwrap();
         let mut document = Document::new();
         let prefab = document.add_imported(self.read(folder.path())).unwrap();
@@ -303,9 +303,8 @@ fn what_cannot_be_animated_is_named() {
     assert_eq!(imported.prefab.animations[0].channels.len(), 2);
 }
 
-/// Every channel is in an export, those that are not played too; what a pointer needs to end somewhere is made.
-#[test]
-fn an_export_has_every_channel() {
+/// A clip with channels of every kind, also such as are not played.
+pub fn every_channel() -> Clip {
     let mut clip = Clip::new();
     let shown = clip.file.accessor("SCALAR", 2, false, Data::U8(&[1, 0]));
     clip.channel("/nodes/1/extensions/KHR_node_visibility/visible", "STEP", shown, 2);
@@ -318,6 +317,14 @@ fn an_export_has_every_channel() {
     clip.file.json["nodes"][4]["extensions"] = json!({"ACME_dial": {"turn": 3}});
     clip.line("/nodes/1/translation", "VEC3", &[0., 0., 0., 4., 0., 0.]);
     clip.line(&format!("{LIGHT}/intensity"), "SCALAR", &[10., 30.]);
+    clip
+}
+
+/// Every channel is in an export, those that are not played too; what a pointer needs to end somewhere is made.
+#[test]
+fn an_export_has_every_channel() {
+    let clip = every_channel();
+    let strength = "extensions/KHR_materials_emissive_strength/emissiveStrength";
     let (document, _) = clip.place();
     let folder = tempfile::tempdir().unwrap();
     let written = folder.path().join("out.glb");

@@ -304,7 +304,16 @@ pub fn samples(folder: &Path) -> Vec<Document> {
     let strange_folder = folder.join("strange");
     std::fs::create_dir(&strange_folder).unwrap();
     strange(&strange_folder, "packet");
-    vec![placed(full), moved, placed(read(&strange_folder.join("file.gltf"))), Document::new()]
+    let mut samples =
+        vec![placed(full), moved, placed(read(&strange_folder.join("file.gltf"))), Document::new()];
+    let files = [crate::kept::strange_file(), crate::kept::loose_file(), crate::scenes::file()];
+    for (number, file) in files.iter().enumerate() {
+        let folder = folder.join(format!("file-{number}"));
+        std::fs::create_dir(&folder).unwrap();
+        samples.push(placed(read(&file.write(&folder))));
+    }
+    samples.push(crate::animation_pointer::every_channel().place().0);
+    samples
 }
 
 #[test]

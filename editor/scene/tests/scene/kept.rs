@@ -22,7 +22,7 @@ fn acme(of: &str) -> Value {
 }
 
 /// Something unknown on everything.
-fn strange_file() -> GltfFile {
+pub fn strange_file() -> GltfFile {
     let mut file = GltfFile::new();
     let position = file.floats("VEC3", 3, &SQUARE);
     let joints = file.accessor("VEC4", 6, false, Data::U8(&[0; 24]));
@@ -159,7 +159,7 @@ fn what_cannot_be_kept_is_counted_by_name() {
 }
 
 /// A mesh of a triangle, points and lines, and one of points alone.
-fn loose_file() -> GltfFile {
+pub fn loose_file() -> GltfFile {
     let mut file = GltfFile::new();
     let position = file.floats("VEC3", 3, &SQUARE);
     let colors = file.accessor("VEC3", 6, true, Data::U8(&[0, 51, 255].repeat(6)));

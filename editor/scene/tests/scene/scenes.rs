@@ -11,7 +11,7 @@ use crate::gltf_file::{GltfFile, SQUARE};
 
 /// Scenes "day", one without a name, and another "day": a floor that two share, a mesh, lamp and camera that only one
 /// has, and a node that none has.
-fn file() -> GltfFile {
+pub fn file() -> GltfFile {
     let mut file = GltfFile::new();
     let position = file.floats("VEC3", 3, &SQUARE);
     for name in ["floor", "chair"] {

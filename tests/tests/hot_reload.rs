@@ -221,8 +221,8 @@ fn what_does_not_fit_the_host_or_the_other_stages_is_named() {
         (
             "passes/rays/surface.rmiss",
             (
-                "rayPayloadInEXT SurfacePayload payload;",
-                "rayPayloadInEXT uvec3 other; SurfacePayload payload;",
+                "layout(location = 0) rayPayloadInEXT SurfacePayload payload;",
+                "struct Other { float t_m; uint more; };\nlayout(location = 0) rayPayloadInEXT Other payload;\n",
             ),
             &["surface.rmiss: ray payload: expected", "found"][..],
         ),
@@ -232,9 +232,12 @@ fn what_does_not_fit_the_host_or_the_other_stages_is_named() {
             &["post.comp: binding 'display': expected an image of Rgba16Float, found Rgba32Float"],
         ),
         (
-            "passes/rays/shape.rchit",
-            ("hitAttributeEXT ", "hitAttributeEXT vec4 wide; "),
-            &["hit attribute: expected"],
+            "passes/rays/surface.rchit",
+            (
+                "hitAttributeEXT vec2 barycentric;",
+                "struct Wide { vec2 at; vec2 more; };\nhitAttributeEXT Wide wide;\n#define barycentric wide.at",
+            ),
+            &["surface.rchit: hit attribute: expected float32x2, found {float32x2, float32x2}"],
         ),
     ] {
         let said = refused(&folder, &mut studio, file, what);

@@ -97,7 +97,9 @@ mod tests {
             let file = folder.join("lib/a.glsl");
             std::fs::write(&file, "1").unwrap();
             let (sender, changes) = channel();
-            let changed = move || drop(sender.send(()).ok());
+            let changed = move || {
+                let _ = sender.send(());
+            };
             let watch = match polled {
                 true => Watch::polled(&folder, changed, "no more of them".to_owned()),
                 false => Watch::start(&folder, changed),

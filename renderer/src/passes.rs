@@ -11,17 +11,18 @@ mod instance_descriptors;
 mod light_shadow;
 mod path_trace;
 mod post;
+mod ray_pipeline;
 mod shading;
 mod shadow;
 mod shape_boxes;
 mod temporal;
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use caustica_gpu::{
-    Bind, ColorTarget, ComputePipeline, Device, Format, GraphicsDesc, GraphicsPipeline, HitGroup,
-    RayTracingDesc, RayTracingPipeline, Recorder, SceneLayout, SceneSet, Specialization, Stage, Use,
+    Bind, ColorTarget, ComputePipeline, Device, Format, GraphicsDesc, GraphicsPipeline, RayTracingPipeline,
+    Recorder, SceneLayout, SceneSet, Specialization, Stage, Use,
 };
 
 pub(crate) use accumulate::Accumulate;
@@ -44,8 +45,9 @@ use crate::error::Result;
 use crate::gpu_types::Push;
 use crate::needs::Needs;
 use crate::settings::Show;
-use crate::shader::{Compiled, Live, Owner, ShaderLibrary, StageOf, check_payloads, merge_interfaces};
+use crate::shader::{Live, Owner, ShaderLibrary, StageOf, merge_interfaces};
 use crate::tables::Tables;
+use ray_pipeline::RayFiles;
 
 /// Builds pipelines for one set of needs.
 pub(crate) struct Builder<'a> {
@@ -108,7 +110,8 @@ impl Builder<'_> {
     fn rays(&self, label: &'static str, generation: &'static str) -> Result<Live<RayTracingPipeline>> {
         let frame = self.frame(label);
         let files = RayFiles::of(generation, self.needs);
-        let make = move |stage: StageOf<'_>| ray_pipeline(&frame, &files, stage);
+        let linked = (self.library.is_edited() && self.device.links_pipelines()).then(Mutex::default);
+        let make = move |stage: StageOf<'_>| ray_pipeline::make(&frame, &files, linked.as_ref(), stage);
         self.library.live(&files.all(), &self.owner, Box::new(make))
     }
 }
@@ -126,67 +129,6 @@ fn compute(
         Ok(ComputePipeline::new(device, label, module, interface, specialization, frame.scene())?)
     };
     library.live(&[file], owner, Box::new(make))
-}
-
-/// The stages of a ray-tracing pipeline.
-#[derive(Clone, Copy)]
-struct RayFiles {
-    generation: &'static str,
-    any_hit: Option<[&'static str; 2]>,
-    /// Closest hit and intersection.
-    shapes: Option<[&'static str; 2]>,
-}
-
-/// Miss shaders of the kinds of rays, in the order of RAY_SURFACE and RAY_SHADOW.
-const MISSES: [&str; 2] = ["passes/rays/surface.rmiss", "passes/rays/shadow.rmiss"];
-const CLOSEST_HIT: &str = "passes/rays/surface.rchit";
-
-impl RayFiles {
-    fn of(generation: &'static str, needs: Needs) -> Self {
-        let any_hit = ["passes/rays/surface.rahit", "passes/rays/shadow.rahit"];
-        let shapes = ["passes/rays/shape.rchit", "passes/rays/shape.rint"];
-        Self { generation, any_hit: needs.any_hit.then_some(any_hit), shapes: needs.shapes.then_some(shapes) }
-    }
-
-    fn all(&self) -> Vec<&'static str> {
-        let optional = self.any_hit.into_iter().chain(self.shapes).flatten();
-        [self.generation].into_iter().chain(MISSES).chain([CLOSEST_HIT]).chain(optional).collect()
-    }
-}
-
-fn ray_pipeline(frame: &Frame, files: &RayFiles, stage: StageOf<'_>) -> Result<RayTracingPipeline> {
-    let pair = |files: [&str; 2]| -> Result<[Arc<Compiled>; 2]> { Ok([stage(files[0])?, stage(files[1])?]) };
-    let generation = stage(files.generation)?;
-    let (misses, closest_hit) = (pair(MISSES)?, stage(CLOSEST_HIT)?);
-    let (any_hit, shapes) = (files.any_hit.map(pair).transpose()?, files.shapes.map(pair).transpose()?);
-    let mut others = vec![&*misses[0], &*misses[1], &*closest_hit];
-    others.extend(any_hit.iter().chain(&shapes).flatten().map(|stage| &**stage));
-    check_payloads(&generation, &others)?;
-    let interface = merge_interfaces(&[&[&*generation], &others[..]].concat())?;
-    let module =
-        |pair: &Option<[Arc<Compiled>; 2]>, at: usize| pair.as_ref().map(|pair| Arc::clone(&pair[at]));
-    let any_hits = [module(&any_hit, 0), module(&any_hit, 1)];
-    let (shape_hit, intersection) = (module(&shapes, 0), module(&shapes, 1));
-    // In the order of RAY_SURFACE and RAY_SHADOW; then the same for shapes (RAY_SHAPES).
-    let mut hit_groups = Vec::new();
-    for (closest, intersection) in [(Some(&closest_hit), None), (shape_hit.as_ref(), intersection.as_ref())] {
-        if hit_groups.is_empty() || intersection.is_some() {
-            hit_groups.extend([closest, None].into_iter().zip(&any_hits).map(|(closest, any_hit)| {
-                HitGroup {
-                    closest_hit: closest.map(|stage| &stage.module),
-                    any_hit: any_hit.as_ref().map(|stage| &stage.module),
-                    intersection: intersection.map(|stage| &stage.module),
-                }
-            }));
-        }
-    }
-    let desc = RayTracingDesc {
-        name: frame.label,
-        ray_generation: &generation.module,
-        misses: &[&misses[0].module, &misses[1].module],
-        hit_groups: &hit_groups,
-    };
-    Ok(RayTracingPipeline::new(&frame.device, &desc, &interface, &frame.specialization, frame.scene())?)
 }
 
 /// Builds a pass that works on tables alone: no scene set, no needs.

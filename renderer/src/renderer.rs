@@ -199,6 +199,8 @@ impl Renderer {
     /// [`RendererOptions::watch_shaders`].
     pub fn edit_shaders(&mut self, folder: &Path, wake: Wake) {
         self.library.edit(folder);
+        // Made anew of groups that can be compiled one by one.
+        self.passes.clear();
         self.reloader = Reloader::new(&self.library, wake);
     }
 

@@ -162,6 +162,11 @@ impl Device {
         &self.instance
     }
 
+    /// Whether ray-tracing pipelines can be linked of groups that were compiled by themselves.
+    pub fn links_pipelines(&self) -> bool {
+        self.candidate.pipeline_library
+    }
+
     /// Whether VK_EXT_memory_budget is there.
     pub(crate) fn has_memory_budget(&self) -> bool {
         self.candidate.memory_budget
@@ -286,6 +291,9 @@ fn create(instance: &Instance, candidate: &Candidate) -> Result<ash::Device> {
     let mut extensions: Vec<_> = REQUIRED_EXTENSIONS.iter().map(|(name, _)| name.as_ptr()).collect();
     if candidate.memory_budget {
         extensions.push(ext::memory_budget::NAME.as_ptr());
+    }
+    if candidate.pipeline_library {
+        extensions.push(khr::pipeline_library::NAME.as_ptr());
     }
     if candidate.swapchain && instance.surface_fns.is_some() {
         extensions.push(khr::swapchain::NAME.as_ptr());

@@ -46,6 +46,8 @@ pub struct Candidate {
     pub lacks: Vec<String>,
     /// Whether VK_EXT_memory_budget is there.
     pub(crate) memory_budget: bool,
+    /// Whether VK_KHR_pipeline_library is there.
+    pub(crate) pipeline_library: bool,
     /// Whether VK_KHR_swapchain is there.
     pub(crate) swapchain: bool,
     /// Bits of a timestamp that count.
@@ -197,6 +199,7 @@ fn examine(
         device_local_bytes,
         lacks,
         memory_budget: has(ext::memory_budget::NAME),
+        pipeline_library: has(khr::pipeline_library::NAME),
         swapchain: has(khr::swapchain::NAME),
     })
 }

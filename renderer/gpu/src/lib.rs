@@ -45,8 +45,8 @@ pub use instance::{Instance, InstanceOptions, Message};
 pub use interface::{Bind, BindSort, Binding, BindingKind, Interface};
 pub use memory::{MemoryBudget, MemoryUse};
 pub use pipeline::{
-    ColorTarget, ComputePipeline, CullMode, GraphicsDesc, GraphicsPipeline, HitGroup, RayTracingDesc,
-    RayTracingPipeline, ShaderModule, Specialization,
+    ColorTarget, ComputePipeline, CullMode, GraphicsDesc, GraphicsPipeline, HitGroup, MAX_LINKED_PAYLOAD,
+    RayGroup, RayGroupDesc, RayTracingDesc, RayTracingPipeline, ShaderModule, Specialization,
 };
 pub use recorder::{Draw, Recorder, Use};
 pub use sampler::{Filter, Sampler, SamplerDesc, WrapMode};

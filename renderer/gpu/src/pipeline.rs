@@ -10,7 +10,9 @@ use ash::vk;
 
 pub use compute::ComputePipeline;
 pub use graphics::{ColorTarget, CullMode, GraphicsDesc, GraphicsPipeline};
-pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
+pub use ray_tracing::{
+    HitGroup, MAX_LINKED_PAYLOAD, RayGroup, RayGroupDesc, RayTracingDesc, RayTracingPipeline,
+};
 
 use crate::Result;
 use crate::context::Device;

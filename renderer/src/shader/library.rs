@@ -110,6 +110,11 @@ impl ShaderLibrary {
         lock(&self.sources).folder().map(Path::to_owned)
     }
 
+    /// Whether shaders are edited while they are in use.
+    pub(crate) fn is_edited(&self) -> bool {
+        self.edited.load(Ordering::Relaxed)
+    }
+
     /// Shaders come from a folder from now on, and are edited there.
     pub(crate) fn edit(&self, folder: &Path) {
         *lock(&self.sources) = ShaderSources::new(Some(folder.to_owned()));

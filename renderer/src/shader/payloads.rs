@@ -3,6 +3,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use caustica_gpu::MAX_LINKED_PAYLOAD;
+
 use super::library::Compiled;
 use super::twins::text_of;
 use crate::error::{RendererError, Result};
@@ -79,6 +81,18 @@ impl RayInterface {
     }
 }
 
+/// Bytes of a type that is written out.
+fn bytes_of(ty: &str) -> u32 {
+    let scalars = ty.split(['{', '}', ',', ' ']).filter(|part| !part.is_empty());
+    let of_scalar = |part: &str| {
+        let counts =
+            part.split(['x', '[']).skip(1).filter_map(|n| n.trim_end_matches(']').parse::<u32>().ok());
+        let bytes = if part.contains("64") { 8 } else { 4 };
+        counts.fold(bytes, u32::saturating_mul)
+    };
+    scalars.map(of_scalar).sum()
+}
+
 /// Whether what the stages of a pipeline send is what they receive. The first one generates the rays.
 ///
 /// # Errors
@@ -87,6 +101,13 @@ pub(crate) fn check_payloads(generation: &Compiled, others: &[&Compiled]) -> Res
     let refuse = |stage: &Compiled, reason: String| {
         Err(RendererError::Interface { file: stage.file().to_owned(), reason })
     };
+    if let Some((name, ty)) = generation.rays.sent.iter().find(|(_, ty)| bytes_of(ty) > MAX_LINKED_PAYLOAD) {
+        let reason = format!(
+            "ray payload {name}: expected at most {MAX_LINKED_PAYLOAD} bytes, found {}",
+            bytes_of(ty)
+        );
+        return refuse(generation, reason);
+    }
     let is_shadow = |stage: &Compiled| stage.name().starts_with("shadow");
     for shadow in [false, true] {
         let of_kind = || others.iter().filter(|stage| is_shadow(stage) == shadow);
@@ -112,4 +133,20 @@ pub(crate) fn check_payloads(generation: &Compiled, others: &[&Compiled]) -> Res
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_have_sizes() {
+        for (ty, bytes) in [
+            ("float32", 4),
+            ("{float32, uint32, uint32, uint32, float32x2, uint32}", 28),
+            ("{float32x3x4, int64x2, {uint32[5]}}", 48 + 16 + 20),
+        ] {
+            assert_eq!(bytes_of(ty), bytes, "{ty}");
+        }
+    }
 }

@@ -163,8 +163,9 @@ impl Device {
     }
 
     /// Whether ray-tracing pipelines can be linked of groups that were compiled by themselves.
+    /// Never on a processor: lavapipe 25.0 crashes in the linked shaders, and compiles at the first trace anyway.
     pub fn links_pipelines(&self) -> bool {
-        self.candidate.pipeline_library
+        self.candidate.pipeline_library && self.candidate.kind != DeviceKind::Cpu
     }
 
     /// Whether VK_EXT_memory_budget is there.

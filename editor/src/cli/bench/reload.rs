@@ -12,8 +12,8 @@ use caustica_renderer::{Pipeline, Primary, ViewSettings, WakeFn};
 use serde::Serialize;
 use serde_json::json;
 
-use super::series::{Series, Spread};
-use super::table::{Table, figure};
+use super::series::{Series, Spread, passes_ms};
+use super::table::{Table, figure, times};
 use super::{Bench, Measured};
 use crate::session::{Session, SessionOptions, load};
 use crate::ui_state::write_built_in;
@@ -44,6 +44,19 @@ struct Row {
     longest_frame_ms: f64,
 }
 
+/// What ray-tracing pipelines cost in each frame that are linked of groups.
+#[derive(Debug, Serialize)]
+struct LinkedRow {
+    way: String,
+    /// Device time of a frame: pipelines made at once, as without edits.
+    at_once_ms: Spread,
+    linked_ms: Spread,
+    ratio: Option<f64>,
+}
+
+const WAYS: [(Pipeline, Primary); 3] =
+    [(Pipeline::Hybrid, Primary::Raster), (Pipeline::Hybrid, Primary::Rays), (Pipeline::Path, Primary::Rays)];
+
 pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
     let on_processor = bench.device.kind() == DeviceKind::Cpu;
     let (extent_px, edits) = match () {
@@ -52,14 +65,12 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
         () => ([1280, 720], 20),
     };
     let mut seen = BTreeSet::new();
-    let mut rows = Vec::new();
-    for (pipeline, primary) in [
-        (Pipeline::Hybrid, Primary::Raster),
-        (Pipeline::Hybrid, Primary::Rays),
-        (Pipeline::Path, Primary::Rays),
-    ] {
+    let (mut rows, mut linked) = (Vec::new(), Vec::new());
+    for (pipeline, primary) in WAYS {
         let folder = tempfile::tempdir()?;
-        let mut session = session_of(bench, folder.path(), pipeline, primary, extent_px)?;
+        write_built_in(folder.path()).map_err(anyhow::Error::msg)?;
+        let settings = ViewSettings { pipeline, primary, ..ViewSettings::default() };
+        let mut session = session_of(bench, Some(folder.path()), &settings, extent_px)?;
         let files: Vec<String> =
             session.shader_files().into_keys().filter(|file| seen.insert(file.clone())).collect();
         let bar = bench.bar(pipeline.name(), files.len());
@@ -72,23 +83,45 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
             }
         }
         bar.finish_and_clear();
+        linked.push(linked_row(bench, &mut session, extent_px)?);
     }
-    let figures = json!({ "extent_px": extent_px, "rows": rows });
-    Ok(Measured { figures, tables: vec![table(&rows)] })
+    let figures = json!({ "extent_px": extent_px, "rows": rows, "linked": linked });
+    Ok(Measured { figures, tables: vec![table(&rows), linked_table(&linked)] })
 }
 
+/// Frame times of two sessions that show the same, taking turns.
+fn linked_row(bench: &Bench, linked: &mut Session, extent_px: [u32; 2]) -> anyhow::Result<LinkedRow> {
+    let settings = linked.settings().clone();
+    let mut whole = session_of(bench, None, &settings, extent_px)?;
+    let (mut at_once, mut of_groups) = (Series::default(), Series::default());
+    for _ in 0..if bench.quick { 1 } else { 5 } {
+        for (session, series) in [(&mut whole, &mut at_once), (&mut *linked, &mut of_groups)] {
+            for index in 0..STILL_FRAMES {
+                frame(session, extent_px)?;
+                // The first ones tell of frames before.
+                if index >= 4 {
+                    series.push(passes_ms(&session.statistics().passes, &[""]));
+                }
+            }
+            session.finish()?;
+        }
+    }
+    let (at_once_ms, linked_ms) = (at_once.spread(), of_groups.spread());
+    let way =
+        format!("{}, first surfaces by {:?}", settings.pipeline.name(), settings.primary).to_lowercase();
+    Ok(LinkedRow { way, at_once_ms, linked_ms, ratio: linked_ms.over(&at_once_ms) })
+}
+
+/// `folder`: shaders are edited there.
 fn session_of(
     bench: &Bench,
-    folder: &Path,
-    pipeline: Pipeline,
-    primary: Primary,
+    folder: Option<&Path>,
+    settings: &ViewSettings,
     extent: [u32; 2],
 ) -> anyhow::Result<Session> {
-    write_built_in(folder).map_err(anyhow::Error::msg)?;
-    let settings = ViewSettings { pipeline, primary, ..ViewSettings::default() };
     let options = SessionOptions {
-        shaders: Some(folder.to_owned()),
-        watch_shaders: Some(WakeFn(Arc::new(|| ()))),
+        shaders: folder.map(Path::to_owned),
+        watch_shaders: folder.map(|_| WakeFn(Arc::new(|| ()))),
         settings: settings.clone(),
         extent,
         ..SessionOptions::default()
@@ -97,7 +130,7 @@ fn session_of(
     let project = &bench.hybrid.project;
     let loaded = load(project, false, &|_, _| ()).with_context(|| project.display().to_string())?;
     session.open(project, loaded)?;
-    session.set_settings(settings);
+    session.set_settings(settings.clone());
     for _ in 0..STILL_FRAMES {
         frame(&mut session, extent)?;
     }
@@ -214,5 +247,16 @@ fn table(rows: &[Row]) -> Table {
         "Saved to shown: from before the file is written to the end of the first frame with the new pipelines. Each edit makes \
          another module, which no cache knows. Frame: on the host, two in flight.",
     );
+    table
+}
+
+fn linked_table(rows: &[LinkedRow]) -> Table {
+    let head = ["picture", "made at once", "linked", "linked / at once"];
+    let mut table = Table::new("Ray-tracing pipelines linked of groups: device ms of a frame", &head);
+    for row in rows {
+        let [at_once, linked] = [row.at_once_ms, row.linked_ms].map(|spread| spread.to_string());
+        table.row(vec![row.way.clone(), at_once, linked, times(row.ratio)]);
+    }
+    table.note("Linked where shaders are edited; without edits they are made at once.");
     table
 }

@@ -144,6 +144,22 @@ impl OpenScene {
         self.picture_revision += u64::from(edit.changes_picture());
         let Some(journal) = &mut self.journal else { return };
         let kept = journal.append(edit, &self.document, &self.meta);
+        self.note_kept(kept);
+    }
+
+    /// Takes over what another project keeps of things that came from there ([`ProjectMeta::keep_of`]). No edit says that: the
+    /// journal gets the whole scene.
+    pub(crate) fn keep_of(&mut self, other: &ProjectMeta, id: impl Fn(u64) -> Option<u64>) {
+        let before = self.meta.clone();
+        self.meta.keep_of(other, id);
+        if let Some(journal) = self.journal.as_mut().filter(|_| self.meta != before) {
+            let kept = journal.append_scene(&self.document, &self.meta);
+            self.note_kept(kept);
+        }
+    }
+
+    /// Tells of a journal that cannot be written, once.
+    fn note_kept(&mut self, kept: std::io::Result<()>) {
         if let Err(error) = &kept
             && !self.journal_fails
         {

@@ -368,7 +368,7 @@ impl Session {
         let brought = files::import(Arc::make_mut(&mut self.scene.document), path, loaded)?;
         let (edit, node) = (brought.edit, brought.node);
         self.push_with_room(edit)?;
-        self.scene.meta.keep_of(&brought.kept, Some);
+        self.scene.keep_of(&brought.kept, Some);
         if was_empty {
             self.camera = ViewCamera::of_document(&self.scene.document, None, self.aspect());
         }
@@ -390,7 +390,7 @@ impl Session {
         let copies = Arc::make_mut(&mut self.scene.document).make_unique_edit(node)?;
         self.push_with_room(copies.edit.clone())?;
         let kept = self.scene.meta.clone();
-        self.scene.meta.keep_of(&kept, |id| copies.id_of(id));
+        self.scene.keep_of(&kept, |id| copies.id_of(id));
         Ok(())
     }
 

@@ -70,7 +70,7 @@ impl Studio {
     pub fn editing(folder: &Path, extent: [u32; 2], settings: ViewSettings) -> Self {
         let (shaders, watch_shaders) = (Some(folder.to_owned()), Some(WakeFn(Arc::new(|| ()))));
         let options = RendererOptions { shaders, watch_shaders, ..RendererOptions::default() };
-        Self::with_options(session(), extent, settings, false, &options)
+        Self::with_options(session(), extent, settings, true, &options)
     }
 
     fn make(

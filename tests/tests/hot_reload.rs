@@ -238,7 +238,7 @@ fn what_does_not_fit_the_host_or_the_other_stages_is_named() {
             "passes/rays/surface.rchit",
             (
                 "hitAttributeEXT vec2 barycentric;",
-                "struct Wide { vec2 at; vec2 more; };\nhitAttributeEXT Wide wide;\n#define barycentric wide.at",
+                "struct Wide { vec2 at; vec2 more; };\nhitAttributeEXT Wide wide;\nvec2 barycentric = wide.at;",
             ),
             &["surface.rchit: hit attribute: expected float32x2, found {float32x2, float32x2}"],
         ),

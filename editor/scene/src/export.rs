@@ -122,7 +122,8 @@ pub fn export_with_progress(
     })?;
     refuse_sources(document, path)?;
     if format == ExportFormat::Gltf {
-        container::refuse_foreign_bin(path)?;
+        let sources = document.prefabs().map(|(_, prefab)| prefab.source.as_path());
+        container::refuse_foreign_bin(path, sources)?;
     }
     let mut writer = Writer::new(document, path);
     let (json, bytes) = writer.write(progress);

@@ -95,7 +95,7 @@ struct Kept {
     textures: BTreeMap<MaterialId, BTreeMap<usize, TextureUse>>,
     /// Moved primitives of meshes that are missing now, as they were in the file.
     meshes: BTreeMap<MeshId, record::MeshRecord>,
-    /// Paths that mean something on another machine alone, as they stood in the file, by what they lead to here.
+    /// Paths that may mean something on another machine, as they stood in the file, by what they lead to here.
     paths: BTreeMap<PathBuf, String>,
     /// The chosen camera when the part that it names is missing now.
     camera: Option<record::CameraRecord>,

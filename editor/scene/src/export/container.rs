@@ -9,18 +9,51 @@ use super::json::{Object, Put};
 use super::{ExportError, ExportFormat};
 use crate::project::atomic;
 
-/// A `.bin` without the `.gltf` of its name may be the buffer of another file.
-pub(super) fn refuse_foreign_bin(path: &Path) -> Result<(), ExportError> {
+/// A `.bin` that is there is replaced only where this program has written it with the `.gltf` of that name, and no source of the
+/// scene reads it.
+pub(super) fn refuse_foreign_bin<'a>(
+    path: &Path,
+    sources: impl Iterator<Item = &'a Path>,
+) -> Result<(), ExportError> {
     let beside = path.with_extension("bin");
-    match beside.exists() && !path.exists() {
-        true => {
-            let name = beside.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let reason =
-                format!("{name} is there already and may belong to another file; choose another name");
-            Err(ExportError::new(path, reason))
-        }
-        false => Ok(()),
+    if !beside.exists() {
+        return Ok(());
     }
+    let name = beside.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let refuse = |why: &str| Err(ExportError::new(path, format!("{name} {why}; choose another name")));
+    if !is_own(path, &beside) {
+        return refuse("is there already and may belong to another file");
+    }
+    let mut readers = sources.filter(|source| buffers_of(source).contains(&beside.canonicalize().ok()));
+    match readers.next() {
+        Some(source) => refuse(&format!("is read by {}, a source of this scene", source.display())),
+        None => Ok(()),
+    }
+}
+
+/// The text of a `.gltf`, where it is one.
+fn json_of(path: &Path) -> Option<Value> {
+    path.extension().filter(|ending| ending.eq_ignore_ascii_case("gltf"))?;
+    serde_json::from_slice(&std::fs::read(path).ok().filter(|bytes| !bytes.is_empty())?).ok()
+}
+
+fn uris_of(json: &Value) -> Vec<&str> {
+    let buffers = json.get("buffers").and_then(Value::as_array).into_iter().flatten();
+    buffers.filter_map(|buffer| buffer.get("uri")?.as_str()).collect()
+}
+
+/// Whether this program wrote a file with this buffer alone.
+fn is_own(path: &Path, beside: &Path) -> bool {
+    let Some(json) = json_of(path) else { return false };
+    let generator = json.pointer("/asset/generator").and_then(Value::as_str);
+    generator.is_some_and(|name| name.starts_with("Caustica")) && uris_of(&json) == [uri_of(beside)]
+}
+
+/// The files that a `.gltf` has its buffers in, links followed.
+fn buffers_of(source: &Path) -> Vec<Option<PathBuf>> {
+    let (Some(json), Some(folder)) = (json_of(source), source.parent()) else { return Vec::new() };
+    let decoded = |uri: &str| percent_encoding::percent_decode_str(uri).decode_utf8_lossy().into_owned();
+    uris_of(&json).into_iter().map(|uri| folder.join(decoded(uri)).canonicalize().ok()).collect()
 }
 
 /// Writes the file and returns every path that was written.

@@ -175,6 +175,16 @@ impl Journal {
         written
     }
 
+    /// Keeps the whole scene, for a change that no edit says.
+    ///
+    /// # Errors
+    /// As [`Self::append`].
+    pub fn append_scene(&mut self, document: &Document, meta: &ProjectMeta) -> io::Result<()> {
+        let kept = self.keep_scene(document, meta);
+        self.is_torn = kept.is_err();
+        kept
+    }
+
     /// Removes what was kept: it is saved, or not wanted any more.
     pub fn discard(&mut self) {
         if let Some(open) = self.open.take() {

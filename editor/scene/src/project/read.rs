@@ -30,7 +30,7 @@ pub(super) fn load(
     progress: &dyn Fn(&str, f32),
 ) -> Result<Project, ProjectProblem> {
     let bytes = read_file(path)?;
-    let loader = Loader::of_file(path, parse(&bytes)?, options, progress)?;
+    let loader = Loader::of_file(path, parse(&bytes)?, false, options, progress)?;
     let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     progress(&name, 1.0);
     Ok(loader.finish(&format!("opened {name}"), Fingerprint::of(&bytes)))
@@ -69,16 +69,18 @@ pub(super) struct Loader<'a> {
     pub meta: ProjectMeta,
     pub warnings: Vec<Warning>,
     outside: Vec<PathBuf>,
+    own_paths: bool,
 }
 
 /// Beyond it a file leaves no room for ids that the document gives out.
 const MOST_ID: u64 = 1 << 62;
 
 impl<'a> Loader<'a> {
-    /// The document of a project that stands at `path`.
+    /// The document of a project that stands at `path`. `own_paths`: they are absolute because the program wrote them so.
     pub fn of_file(
         path: &'a Path,
         file: ProjectFile,
+        own_paths: bool,
         options: &ImportOptions,
         progress: &dyn Fn(&str, f32),
     ) -> Result<Self, ProjectProblem> {
@@ -94,6 +96,7 @@ impl<'a> Loader<'a> {
             meta: ProjectMeta { view: record.view, render: record.render, ..ProjectMeta::default() },
             warnings: Vec::new(),
             outside: Vec::new(),
+            own_paths,
         };
         loader.meta.kept.unknown = unknown;
         // Before anything new gets an id, so that none in the file is taken.
@@ -143,7 +146,7 @@ impl Loader<'_> {
 
     /// Where a path of the project leads, or why it is not followed. Noted when permission could be given.
     fn locate(&mut self, text: &str) -> (PathBuf, Result<(), String>) {
-        if is_foreign(text) {
+        if is_foreign(text) || (Path::new(text).is_absolute() && !self.own_paths) {
             let kept = &mut self.meta.kept.paths;
             kept.insert(from_relative(self.path, text), text.to_owned());
         }
@@ -253,8 +256,9 @@ impl Loader<'_> {
         material
     }
 
-    /// Moves that no longer fit the source are kept for the next save.
+    /// Moves that do not fit the source are kept for the next save.
     fn move_primitives(&mut self, record: MeshRecord) {
+        let mut left = BTreeMap::new();
         for (&primitive, columns) in &record.primitives {
             let edit = Edit::SetPrimitiveTransform {
                 mesh: record.id,
@@ -262,13 +266,14 @@ impl Loader<'_> {
                 mesh_from_primitive: DAffine3::from_cols_array(columns),
             };
             if let Err(error) = self.document.apply(edit) {
-                self.warn(
-                    format!("mesh {}", record.id.0),
-                    format!("primitive {primitive} was moved, but {error}; the move is kept on save"),
-                );
-                self.meta.kept.meshes.insert(record.id, record);
-                return;
+                let message =
+                    format!("primitive {primitive} was moved, but {error}; the move is kept on save");
+                self.warn(format!("mesh {}", record.id.0), message);
+                left.insert(primitive, *columns);
             }
+        }
+        if !left.is_empty() {
+            self.meta.kept.meshes.insert(record.id, MeshRecord { primitives: left, ..record });
         }
     }
 

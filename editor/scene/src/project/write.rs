@@ -1,7 +1,7 @@
 //! A document as the text of a project file.
 //! In: document and meta. Out: JSON with a fixed order of keys: the same scene gives the same bytes.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::DAffine3;
@@ -132,7 +132,10 @@ fn meshes(document: &Document, meta: &ProjectMeta) -> Vec<MeshRecord> {
     let is_written = written_meshes(document);
     let written = document.meshes().filter(|(id, mesh)| is_written(*id, mesh));
     let moved = written.filter_map(|(id, mesh)| MeshRecord::of(id, mesh));
-    records.extend(moved.map(|record| (record.id, record)));
+    for MeshRecord { id, primitives } in moved {
+        let empty = || MeshRecord { id, primitives: BTreeMap::new() };
+        records.entry(id).or_insert_with(empty).primitives.extend(primitives);
+    }
     records.into_values().collect()
 }
 

@@ -350,6 +350,19 @@ fn what_cannot_be_written_is_said_with_the_file() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing but the source is there");
     std::fs::write(folder.path().join("taken.bin"), "of another").unwrap();
     fails("taken.gltf", "taken.bin is there already");
+    // A file of this name does not make the buffer ours: it may be that of another one.
+    std::fs::write(folder.path().join("taken.gltf"), "{}").unwrap();
+    fails("taken.gltf", "taken.bin is there already");
+    assert_eq!(std::fs::read(folder.path().join("taken.bin")).unwrap(), b"of another");
+    // What was exported may be exported again, but not once the scene reads it.
+    let own = folder.path().join("own.gltf");
+    export(&scene.document, &own).unwrap();
+    export(&scene.document, &own).unwrap();
+    let copy = folder.path().join("copy.gltf");
+    std::fs::copy(&own, &copy).unwrap();
+    let imported = read(&copy);
+    let error = export(&placed(imported), &own).unwrap_err().to_string();
+    assert!(error.contains("own.bin is read by") && error.contains("copy.gltf"), "{error}");
 }
 
 #[test]

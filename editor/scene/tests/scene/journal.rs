@@ -362,3 +362,26 @@ fn an_edit_costs_the_same_bytes_in_any_scene() {
     // The first of each comes with the head; ids and numbers of the large scene have some digits more.
     assert!(lengths[4] < lengths[1] + 16 && lengths[3] < lengths[0] + 64, "{lengths:?}");
 }
+
+#[test]
+fn what_a_project_keeps_besides_comes_back_once_the_journal_has_the_scene() {
+    let root = tempfile::tempdir().unwrap();
+    let scene = edited(root.path());
+    let (mut kept, path) = Kept::saved(root.path(), scene.document.clone());
+    let mut file: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    file["nodes"][0]["colour"] = "red".into();
+    let other = root.path().join("other.caustica.json");
+    std::fs::write(&other, file.to_string()).unwrap();
+    let other = Project::load(&other).unwrap();
+    kept.push(Edit::Rename { target: scene.light.into(), name: "Moon".into() });
+    let mut with_it = meta();
+    with_it.keep_of(&other.meta, Some);
+    assert_ne!(with_it, meta());
+    kept.journal.append_scene(&kept.document, &with_it).unwrap();
+    kept.push(Edit::Rename { target: scene.light.into(), name: "Star".into() });
+    let (document, folder) = kept.die();
+    let recovered = recover(&folder);
+    assert!(recovered.project.document == document);
+    assert_eq!((recovered.project.meta, recovered.path.as_deref()), (with_it, Some(path.as_path())));
+    assert_eq!(recovered.steps.len(), 1, "what came after the scene");
+}

@@ -126,6 +126,23 @@ fn what_was_edited_waits_for_a_source_that_lacks_it() {
 }
 
 #[test]
+fn moves_that_fit_do_not_take_the_place_of_those_that_do_not() {
+    let Edited { folder: _folder, path, .. } = edited();
+    let mut file: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    file["meshes"][0]["primitives"]["3"] = json!([1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 7]);
+    std::fs::write(&path, file.to_string()).unwrap();
+    for _ in 0..2 {
+        let project = Project::load(&path).unwrap();
+        assert_eq!(project.warnings.len(), 1, "{:?}", project.warnings);
+        assert_eq!(moved(&project.document), ["b"]);
+        Project::save(&path, &project.document, &project.meta).unwrap();
+        let saved: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        let primitives = saved["meshes"][0]["primitives"].as_object().unwrap();
+        assert_eq!(primitives.keys().collect::<Vec<_>>(), ["0", "3"]);
+    }
+}
+
+#[test]
 fn a_reload_keeps_what_was_edited_and_is_undone() {
     let Edited { folder, document: before, prefab, .. } = edited();
     let mut document = before.clone();
@@ -192,10 +209,15 @@ fn a_unique_copy_has_what_is_kept_for_its_source() {
 fn paths_of_other_machines_stay_as_they_were_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.caustica.json");
-    let sources = ["C:\\models\\a.glb", "\\\\host\\share\\a.glb", "//host/a.glb", "http://host/a.glb"];
-    for (source, sky) in
-        sources.iter().zip(["d:/sky.hdr", "//host/sky.hdr", "https://host/sky.hdr", "E:\\sky.exr"])
-    {
+    let sources = [
+        "C:\\models\\a.glb",
+        "\\\\host\\share\\a.glb",
+        "//host/a.glb",
+        "http://host/a.glb",
+        "/Users/b/a.glb",
+    ];
+    let skies = ["d:/sky.hdr", "//host/sky.hdr", "https://host/sky.hdr", "E:\\sky.exr", "/Users/b/sky.hdr"];
+    for (source, sky) in sources.iter().zip(skies) {
         let text = json!({"caustica": 2, "prefabs": [{"id": 1, "name": "m", "source": source}],
             "environment": {"kind": "file", "path": sky}});
         std::fs::write(&path, text.to_string()).unwrap();

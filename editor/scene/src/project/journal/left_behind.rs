@@ -185,7 +185,7 @@ impl LeftBehind {
                 (path, record, base.left_out, found)
             }
         };
-        let mut loader = Loader::of_file(loader_path, record, options, progress).map_err(fail)?;
+        let mut loader = Loader::of_file(loader_path, record, is_scene, options, progress).map_err(fail)?;
         loader.document.reserve_ids_up_to(contents.next_id.saturating_sub(1));
         if !base.is_as_it_was {
             let message = "the file has changed since; the unsaved changes were applied as far as they fit";

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::num::NonZero;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -19,7 +20,7 @@ use crate::error::Result;
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// A program may save a file in several steps: so long must it have been quiet.
-const QUIET: Duration = Duration::from_millis(8);
+const QUIET: Duration = Duration::from_millis(4);
 /// But no longer than this is waited.
 const MOST_WAIT: Duration = Duration::from_millis(200);
 
@@ -80,8 +81,18 @@ pub(crate) struct TakenOver {
 }
 
 enum Hint {
-    Look,
+    /// These files may have changed; none: any.
+    Look(Vec<PathBuf>),
     Stop,
+}
+
+/// What the thread remembers from one change to the next.
+#[derive(Default)]
+struct Memory {
+    /// Texts as they were read last, by their path in the folder.
+    texts: BTreeMap<String, String>,
+    /// Main files that are not in use as they are: they are looked at again whatever has changed.
+    refused: BTreeSet<String>,
 }
 
 /// Watches the folder of a library.
@@ -119,9 +130,12 @@ impl Reloader {
         };
         let worker = worker.inspect_err(|error| tracing::warn!("shaders are not reloaded: {error}")).ok()?;
         // What is there may differ from what is in use.
-        let _ = hints.send(Hint::Look);
+        let _ = hints.send(Hint::Look(Vec::new()));
         let look = hints.clone();
-        let watch = Watch::start(&folder, move || drop(look.send(Hint::Look)));
+        let watch = Watch::start(&folder, move |files| {
+            // Nobody looks any more at the end of the program.
+            let _ = look.send(Hint::Look(files));
+        });
         let status = ShaderStatus { watching: Some(watch.how().clone()), ..ShaderStatus::default() };
         let outcomes = Mutex::new(outcomes);
         Some(Self {
@@ -217,17 +231,23 @@ fn work(
     compiling: &AtomicBool,
     done: impl Fn(Outcome) -> bool,
 ) {
-    while let Ok(Hint::Look) = hints.recv() {
+    let mut memory = Memory::default();
+    while let Ok(Hint::Look(files)) = hints.recv() {
         let noticed = Instant::now();
+        let mut hinted = vec![files];
         loop {
             match hints.recv_timeout(QUIET) {
-                Ok(Hint::Look) if noticed.elapsed() < MOST_WAIT => {}
-                Ok(Hint::Look) | Err(RecvTimeoutError::Timeout) => break,
+                Ok(Hint::Look(files)) => hinted.push(files),
+                Err(RecvTimeoutError::Timeout) => break,
                 Ok(Hint::Stop) | Err(RecvTimeoutError::Disconnected) => return,
             }
+            if noticed.elapsed() >= MOST_WAIT {
+                break;
+            }
         }
+        let changed = names_of(library, &hinted);
         compiling.store(true, Ordering::Relaxed);
-        let outcome = make_anew(library, noticed);
+        let outcome = make_anew(library, noticed, changed.as_ref(), &mut memory);
         compiling.store(false, Ordering::Relaxed);
         if !done(outcome) {
             return;
@@ -235,8 +255,25 @@ fn work(
     }
 }
 
+/// The paths of files inside the folder; `None`: any may have changed.
+fn names_of(library: &ShaderLibrary, hinted: &[Vec<PathBuf>]) -> Option<BTreeSet<String>> {
+    let folder = library.folder()?;
+    let name = |path: &PathBuf| {
+        let inside = path.strip_prefix(&folder).ok()?;
+        let parts: Option<Vec<&str>> = inside.components().map(|part| part.as_os_str().to_str()).collect();
+        parts.map(|parts| parts.join("/"))
+    };
+    let all_named = hinted.iter().all(|files| !files.is_empty());
+    all_named.then(|| hinted.iter().flatten().map(name).collect()).flatten()
+}
+
 /// Compiles every stage whose text is another one, and makes the pipelines in use that have one of them.
-fn make_anew(library: &ShaderLibrary, noticed: Instant) -> Outcome {
+fn make_anew(
+    library: &ShaderLibrary,
+    noticed: Instant,
+    hinted: Option<&BTreeSet<String>>,
+    memory: &mut Memory,
+) -> Outcome {
     let since = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
     let mut reload = Reload {
         files: Vec::new(),
@@ -247,12 +284,20 @@ fn make_anew(library: &ShaderLibrary, noticed: Instant) -> Outcome {
         total_ms: 0.0,
     };
     let mut faults = Vec::new();
-    let mut texts = BTreeMap::new();
-    let mut changed_files = BTreeSet::new();
+    let Memory { texts, refused } = memory;
+    match hinted {
+        Some(files) => texts.retain(|file, _| !files.contains(file)),
+        None => texts.clear(),
+    }
+    let (mut changed_files, mut unread) = (BTreeSet::new(), BTreeSet::new());
     let mut changed = Vec::new();
     let sources = library.sources();
-    for stage in library.all_stages() {
-        match sources.load_with(stage.file(), &mut texts) {
+    let is_concerned = |stage: &Arc<Compiled>| {
+        let holds = |files: &BTreeSet<String>| stage.source.texts.keys().any(|file| files.contains(file));
+        refused.contains(stage.file()) || hinted.is_none_or(holds)
+    };
+    for stage in library.all_stages().into_iter().filter(is_concerned) {
+        match sources.load_with(stage.file(), texts) {
             Ok(source) if source == stage.source => {}
             Ok(source) => {
                 let before = &stage.source.texts;
@@ -261,9 +306,13 @@ fn make_anew(library: &ShaderLibrary, noticed: Instant) -> Outcome {
                 changed_files.extend(before.keys().filter(|file| !source.texts.contains_key(*file)).cloned());
                 changed.push(source);
             }
-            Err(error) => faults.extend(ShaderFault::of_error(error)),
+            Err(error) => {
+                faults.extend(ShaderFault::of_error(error));
+                unread.insert(stage.file().to_owned());
+            }
         }
     }
+    *refused = changed.iter().map(|source| source.file.clone()).chain(unread).collect();
     reload.files = changed_files.into_iter().collect();
     reload.read_ms = since(noticed);
     let start = Instant::now();
@@ -302,6 +351,9 @@ fn make_anew(library: &ShaderLibrary, noticed: Instant) -> Outcome {
         (&a.file, a.line, a.column, &a.message).cmp(&(&b.file, b.line, b.column, &b.message))
     });
     faults.dedup();
+    if faults.is_empty() {
+        refused.clear();
+    }
     Outcome { reload, noticed, made: if faults.is_empty() { Ok(made) } else { Err(faults) } }
 }
 

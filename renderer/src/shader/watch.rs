@@ -1,7 +1,8 @@
-//! Notices that something below a folder was saved. Enters: a folder. Leaves: calls, from another thread, after any change.
+//! Notices that something below a folder was saved. Enters: a folder. Leaves: calls, from another thread, with the files that may
+//! have changed; none: any may have.
 //! Where the system's watcher cannot start, the folder is looked at again and again.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use notify::{Config, EventKind, PollWatcher, RecommendedWatcher, RecursiveMode, Watcher};
@@ -27,7 +28,7 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    pub(super) fn start(folder: &Path, changed: impl Fn() + Clone + Send + 'static) -> Self {
+    pub(super) fn start(folder: &Path, changed: impl Fn(Vec<PathBuf>) + Clone + Send + 'static) -> Self {
         let told = || -> notify::Result<Box<dyn Watcher + Send + Sync>> {
             let mut watcher = RecommendedWatcher::new(handler(changed.clone()), Config::default())?;
             watcher.watch(folder, RecursiveMode::Recursive)?;
@@ -40,7 +41,7 @@ impl Watch {
     }
 
     /// `reason`: why the system does not tell.
-    fn polled(folder: &Path, changed: impl Fn() + Send + 'static, reason: String) -> Self {
+    fn polled(folder: &Path, changed: impl Fn(Vec<PathBuf>) + Send + 'static, reason: String) -> Self {
         let polled = || -> notify::Result<PollWatcher> {
             let config = Config::default().with_poll_interval(POLL).with_compare_contents(true);
             let mut watcher = PollWatcher::new(handler(changed), config)?;
@@ -65,13 +66,15 @@ impl Watch {
 }
 
 /// Passes on what may have changed a file; that a file was read does not.
-fn handler(changed: impl Fn() + Send + 'static) -> impl Fn(notify::Result<notify::Event>) + Send + 'static {
+fn handler(
+    changed: impl Fn(Vec<PathBuf>) + Send + 'static,
+) -> impl Fn(notify::Result<notify::Event>) + Send + 'static {
     move |event| match event {
         Ok(event) if matches!(event.kind, EventKind::Access(kind) if !writes(kind)) => {}
-        Ok(_) => changed(),
+        Ok(event) => changed(event.paths),
         Err(error) => {
             tracing::warn!("watching the shaders: {error}");
-            changed();
+            changed(Vec::new());
         }
     }
 }
@@ -97,7 +100,7 @@ mod tests {
             let file = folder.join("lib/a.glsl");
             std::fs::write(&file, "1").unwrap();
             let (sender, changes) = channel();
-            let changed = move || {
+            let changed = move |_| {
                 let _ = sender.send(());
             };
             let watch = match polled {

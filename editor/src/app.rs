@@ -15,11 +15,13 @@ use crate::worker::Wake;
 
 pub mod actions;
 mod adaptive;
+pub mod after_hang;
 mod dispatch;
 pub mod editor;
 mod export;
 mod files;
 mod recovery;
+pub mod rescue;
 mod shaders;
 mod window;
 
@@ -36,6 +38,8 @@ pub struct AppOptions {
     pub validation: bool,
     /// Refuse to use more device memory than this.
     pub memory_limit_bytes: Option<u64>,
+    /// What a process has left for this one whose device did not come back.
+    pub after_hang: Option<PathBuf>,
 }
 
 /// Opens the window and runs until it is closed.

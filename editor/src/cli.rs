@@ -40,6 +40,9 @@ struct Cli {
     /// Read shaders from this folder instead of the copy in the binary
     #[arg(long, value_name = "DIR", global = true)]
     shaders: Option<PathBuf>,
+    /// What a process has left for this one whose device did not come back
+    #[arg(long, hide = true)]
+    after_hang: Option<PathBuf>,
 }
 
 #[derive(Subcommand, Debug)]
@@ -120,7 +123,7 @@ const EXIT_INPUT: u8 = 1;
 /// Wrong usage.
 const EXIT_USAGE: u8 = 2;
 /// No suitable device, or the device failed.
-const EXIT_DEVICE: u8 = 3;
+pub(crate) const EXIT_DEVICE: u8 = 3;
 
 /// Parses the command line and runs it.
 pub fn run() -> ExitCode {
@@ -149,6 +152,7 @@ pub fn run() -> ExitCode {
                 shaders: cli.shaders.or_else(shader_folder),
                 validation: cli.device.validation,
                 memory_limit_bytes: cli.device.memory_limit_bytes(),
+                after_hang: cli.after_hang,
             })
             .map(|()| ExitCode::SUCCESS),
         },

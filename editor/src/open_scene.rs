@@ -70,6 +70,11 @@ impl OpenScene {
         journal.is_some_and(|journal| journal.path().is_some())
     }
 
+    /// Where unsaved changes are kept, once there are any.
+    pub fn journal_path(&self) -> Option<&Path> {
+        self.journal.as_ref().and_then(Journal::path)
+    }
+
     /// Why edits are not kept, in words; once for each time that it begins.
     pub fn take_journal_fault(&mut self) -> Option<String> {
         self.journal_fault.take()

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use caustica_renderer::delta::LightId;
 use caustica_renderer::gpu::{Device, Frames};
-use caustica_renderer::shader::{ShaderStatus, Wake};
+use caustica_renderer::shader::{HeldShader, ShaderLibrary, ShaderStatus, Wake};
 use caustica_renderer::{
     AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings, WakeFn,
 };
@@ -44,6 +44,8 @@ pub struct SessionOptions {
     pub shaders: Option<PathBuf>,
     /// Shaders of that folder are edited; this is called when there is something new to see.
     pub watch_shaders: Option<WakeFn>,
+    /// Shaders of that folder that did not finish.
+    pub held_shaders: Vec<HeldShader>,
     /// Settings of the view.
     pub settings: ViewSettings,
     /// Size of the view in pixels.
@@ -109,6 +111,7 @@ impl Session {
         let renderer_options = RendererOptions {
             shaders: options.shaders,
             watch_shaders: options.watch_shaders,
+            held_shaders: options.held_shaders,
             acceleration,
             primary_rays_pay: profile.profile.primary_rays_pay(),
         };
@@ -138,6 +141,11 @@ impl Session {
     /// How it stands with shaders that are edited.
     pub fn shader_status(&self) -> ShaderStatus {
         self.renderer.shader_status()
+    }
+
+    /// All shaders.
+    pub fn shader_library(&self) -> &Arc<ShaderLibrary> {
+        self.renderer.shader_library()
     }
 
     /// Where shaders are edited; `None`: they are those of the binary.

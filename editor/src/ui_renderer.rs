@@ -134,6 +134,10 @@ impl UiRenderer {
 
 impl Drop for UiRenderer {
     fn drop(&mut self) {
+        if self.device.is_given_up() {
+            std::mem::forget(self.renderer.take());
+            return;
+        }
         if let Err(error) = self.device.wait_idle() {
             tracing::error!("waiting for the device before closing the window failed: {error}");
         }

@@ -18,7 +18,9 @@ use crate::needs::Needs;
 use crate::passes::{Builder, PassSet, ScenePasses};
 use crate::sampling::Sampling;
 use crate::settings::{Pipeline, Primary, ViewSettings};
-use crate::shader::{Reloader, ShaderLibrary, ShaderSources, ShaderStatus, SpirvCache, TakenOver, Wake};
+use crate::shader::{
+    HeldShader, Reloader, ShaderLibrary, ShaderSources, ShaderStatus, SpirvCache, TakenOver, Wake,
+};
 use crate::summary::Summary;
 use crate::tables::{Changed, Tables, changes_image};
 use crate::view::{CameraMatrices, View, ViewId};
@@ -33,6 +35,8 @@ pub struct RendererOptions {
     /// Shaders of that folder are edited: pipelines are made anew when a file changes, and this is called, on another thread, when
     /// the next frame will show it.
     pub watch_shaders: Option<WakeFn>,
+    /// Shaders of that folder that did not finish: others are used in their place.
+    pub held_shaders: Vec<HeldShader>,
     /// When acceleration structures are built, refitted and compacted.
     pub acceleration: AccelPolicy,
     /// Rays find the first surfaces faster than the rasteriser does: what [`Primary::Auto`] means.
@@ -99,7 +103,7 @@ impl Renderer {
         let mut recorder = frames.begin()?;
         let tables = Tables::new(device, &mut recorder)?;
         frames.submit(recorder, None)?;
-        let sources = ShaderSources::new(options.shaders.clone());
+        let sources = ShaderSources::new(options.shaders.clone()).holding(options.held_shaders.clone());
         let edited = options.watch_shaders.is_some();
         let library = Arc::new(ShaderLibrary::new(device, sources, SpirvCache::of_user(), edited));
         let wake = options.watch_shaders.clone();
@@ -207,6 +211,11 @@ impl Renderer {
     /// The shader files that pipelines were made of so far: main files with what they include.
     pub fn shader_files(&self) -> BTreeMap<String, Vec<String>> {
         self.library.files()
+    }
+
+    /// All shaders; tells on any thread which ones are to blame for a pass that does not finish.
+    pub fn shader_library(&self) -> &Arc<ShaderLibrary> {
+        &self.library
     }
 
     /// How it stands with shaders that are edited.

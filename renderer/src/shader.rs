@@ -9,6 +9,7 @@ mod payloads;
 mod reflect;
 mod reload;
 mod sources;
+mod suspects;
 mod twins;
 mod watch;
 
@@ -18,6 +19,7 @@ pub use library::{Compiled, ShaderLibrary, merge_interfaces};
 pub use reflect::{Reflection, reflect};
 pub use reload::{Reload, ShaderStatus, Wake};
 pub use sources::{ShaderSources, Source};
+pub use suspects::HeldShader;
 pub use watch::Watching;
 
 pub(crate) use fault::listed;

@@ -10,6 +10,7 @@ use egui::{CentralPanel, Context, Frame, Id, Margin, Modal, Panel, Ui, WidgetTex
 use egui_dock::{DockArea, DockState, TabViewer};
 
 use super::actions::{self, Action};
+use super::after_hang::AfterHang;
 use super::export::Exporting;
 use super::files::Loading;
 use super::recovery::{Recovering, Watch};
@@ -52,6 +53,10 @@ pub struct Editor {
     pub(super) recovering: Option<Recovering>,
     /// Journals of processes that may just be ending.
     pub(super) watch: Watch,
+    /// The file that was opened; a model does not become the project's file.
+    pub(super) opened: Option<PathBuf>,
+    /// What selection and view are to be once the scene is back.
+    pub(super) restoring: Option<Box<AfterHang>>,
     /// The project that was opened, and files that it names outside of its folder, while the user is asked about them.
     pub(super) outside: Option<(PathBuf, Vec<PathBuf>)>,
     /// Files to import after the present one.
@@ -87,6 +92,8 @@ impl Editor {
             later: BTreeSet::new(),
             recovering: None,
             watch: Watch::default(),
+            opened: None,
+            restoring: None,
             outside: None,
             waiting: VecDeque::new(),
             audit: None,

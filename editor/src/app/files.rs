@@ -153,8 +153,12 @@ impl Editor {
             _ => Vec::new(),
         };
         self.session.open(path, loaded)?;
+        self.opened = Some(path.to_owned());
         self.state.config.remember(path);
         self.new_scene_shown();
+        if self.restore() {
+            return Ok(());
+        }
         self.tell(format!("Opened {}", short(path)), warnings);
         self.ask_about_left_behind_of(path);
         self.outside = (!outside.is_empty()).then(|| (path.to_owned(), outside));
@@ -276,9 +280,13 @@ impl Editor {
 
     /// Goes on after the question about unsaved changes.
     pub(super) fn go_on(&mut self, then: Then) {
+        self.restoring = None;
         match then {
             Then::New => match self.session.new_document() {
-                Ok(()) => self.new_scene_shown(),
+                Ok(()) => {
+                    self.opened = None;
+                    self.new_scene_shown();
+                }
                 Err(error) => self.state.toasts.error(format!("No new scene: {error:#}.")),
             },
             Then::AskAndOpen => self.ask(Wish::Open),

@@ -141,7 +141,7 @@ impl Editor {
         self.later.extend(self.left_behind.drain(..).map(|left| left.path().to_owned()));
     }
 
-    fn start_recovering(&mut self, left: LeftBehind) {
+    pub(super) fn start_recovering(&mut self, left: LeftBehind) {
         // What was about to be opened would take the place of what is recovered.
         self.loading = None;
         self.waiting.clear();
@@ -165,7 +165,10 @@ impl Editor {
                 match self.session.recover(recovered) {
                     Ok(()) => {
                         self.new_scene_shown();
-                        self.tell("Recovered the unsaved changes; save to keep them".to_owned(), warnings);
+                        if !self.restore() {
+                            let done = "Recovered the unsaved changes; save to keep them";
+                            self.tell(done.to_owned(), warnings);
+                        }
                     }
                     Err(error) => self.state.toasts.error(format!("Nothing was recovered: {error:#}.")),
                 }

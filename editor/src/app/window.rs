@@ -19,7 +19,9 @@ use winit::window::Window;
 use super::AppOptions;
 use super::actions::Action;
 use super::adaptive::AdaptiveResolution;
+use super::after_hang::AfterHang;
 use super::editor::Editor;
+use super::rescue::Rescue;
 use crate::log_buffer::LogBuffer;
 use crate::recovery;
 use crate::session::{Session, SessionOptions, ViewCamera};
@@ -30,6 +32,9 @@ use crate::worker::Wake;
 
 /// How often a slow device is asked whether it has finished.
 const DEVICE_POLL: Duration = Duration::from_millis(4);
+
+/// How often is noted how everything is, should the device not come back.
+const KEEP_EVERY: Duration = Duration::from_millis(500);
 
 /// Whether the program goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,6 +83,9 @@ impl Broken {
 
 /// The window with all it holds. Fields are dropped in this order: the device's users before the window.
 pub(super) struct EditorWindow {
+    rescue: Rescue,
+    /// When the rescue was told how everything is.
+    kept: Option<Instant>,
     ui: UiRenderer,
     swapchain: Swapchain,
     editor: Editor,
@@ -118,7 +126,8 @@ impl EditorWindow {
         log: LogBuffer,
         wake: Wake,
     ) -> anyhow::Result<Self> {
-        let config = Config::load();
+        let after_hang = options.after_hang.as_deref().and_then(AfterHang::take);
+        let config = after_hang.as_ref().map_or_else(Config::load, |after| after.config.clone());
         let [width, height] = config.window;
         let attributes = Window::default_attributes()
             .with_title("Caustica")
@@ -149,7 +158,11 @@ impl EditorWindow {
         let mut session = Session::new(
             &device,
             SessionOptions {
-                shaders: options.shaders.clone(),
+                shaders: match &after_hang {
+                    Some(after) => after.shaders.clone(),
+                    None => options.shaders.clone(),
+                },
+                held_shaders: after_hang.as_ref().map(|after| after.held.clone()).unwrap_or_default(),
                 watch_shaders: Some(WakeFn(Arc::clone(&wake))),
                 extent: [size.width.max(8), size.height.max(8)],
                 window: true,
@@ -162,13 +175,20 @@ impl EditorWindow {
         }
         let mut editor = Editor::new(session, config, wake);
         editor.state.log = log;
-        editor.ask_about_left_behind();
         tracing::info!("{} ({})", device.name(), device.driver());
-        if let Some(file) = &options.file {
-            editor.request(Action::OpenPath(file.clone()));
+        let rescue = Rescue::new(&device, editor.session.shader_library(), after_hang.is_some());
+        if let Some(after) = after_hang {
+            editor.go_on_after_hang(after);
+        } else {
+            editor.ask_about_left_behind();
+            if let Some(file) = &options.file {
+                editor.request(Action::OpenPath(file.clone()));
+            }
         }
         window.request_redraw();
         Ok(Self {
+            rescue,
+            kept: None,
             ui,
             swapchain,
             editor,
@@ -231,21 +251,46 @@ impl EditorWindow {
 
     /// Keeps layout, theme and recent files for the next run.
     pub(super) fn save_config(&mut self) {
-        let size: LogicalSize<f32> = self.window.inner_size().to_logical(self.window.scale_factor());
-        self.editor.state.config.window = [size.width, size.height];
+        self.note_window_size();
         if let Err(error) = self.editor.config().save() {
             tracing::warn!("the layout is not kept: {error:#}");
         }
     }
 
+    /// Tells the rescue how everything is: before every frame that shows a new shader for the first times, else now and then.
+    fn keep(&mut self) {
+        if !self.rescue.has_suspects() && self.kept.is_some_and(|kept| kept.elapsed() < KEEP_EVERY) {
+            return;
+        }
+        self.kept = Some(Instant::now());
+        self.note_window_size();
+        self.rescue.keep(self.editor.to_keep());
+    }
+
+    /// Where the device is gone, starts the program again; comes back when that cannot be.
+    fn start_again(&self, error: anyhow::Error) -> anyhow::Error {
+        match frames::device_gone(&error) {
+            Some(gone) => {
+                self.rescue.keep(self.editor.to_keep());
+                let why = self.rescue.start_again(gone);
+                error.context(why)
+            }
+            None => error,
+        }
+    }
+
+    fn note_window_size(&mut self) {
+        let size: LogicalSize<f32> = self.window.inner_size().to_logical(self.window.scale_factor());
+        self.editor.state.config.window = [size.width, size.height];
+    }
+
     /// Takes in one event.
     pub(super) fn event(&mut self, event: WindowEvent) -> anyhow::Result<Next> {
         if matches!(event, WindowEvent::RedrawRequested) {
-            if self.silent && !self.must_resize && self.panels_due.is_none_or(|due| Instant::now() < due) {
-                self.silent_frame()?;
-            } else {
-                self.frame()?;
-            }
+            let silent =
+                self.silent && !self.must_resize && self.panels_due.is_none_or(|due| Instant::now() < due);
+            let drawn = if silent { self.silent_frame() } else { self.frame() };
+            drawn.map_err(|error| self.start_again(error))?;
             return Ok(if self.editor.should_quit() { Next::Quit } else { Next::GoOn });
         }
         let response = self.input.on_window_event(&self.window, &event);
@@ -274,7 +319,10 @@ impl EditorWindow {
 
 impl Drop for EditorWindow {
     fn drop(&mut self) {
-        if let Err(error) = self.device.wait_idle() {
+        self.rescue.leave();
+        if !self.device.is_given_up()
+            && let Err(error) = self.device.wait_idle()
+        {
             tracing::error!("waiting for the device at the end failed: {error}");
         }
     }

@@ -57,6 +57,23 @@ impl ShaderTexts {
         self.open.keys().map(String::as_str).filter(|file| self.is_modified(file)).collect()
     }
 
+    /// Texts that were changed here and not saved, by file.
+    pub fn unsaved(&self) -> BTreeMap<String, String> {
+        let modified = self.open.iter().filter(|(_, text)| text.now != text.saved);
+        modified.map(|(file, text)| (file.clone(), text.now.clone())).collect()
+    }
+
+    /// Opens the texts again that another process had not saved, and the file that it showed.
+    pub fn put_back(&mut self, folder: &Path, unsaved: BTreeMap<String, String>, shown: Option<String>) {
+        for (file, now) in unsaved {
+            let saved = read(folder, &file).unwrap_or_default();
+            self.open.insert(file, Text { now, saved });
+        }
+        if let Some(Err(error)) = shown.map(|file| self.show(folder, &file, None)) {
+            tracing::debug!("{error}");
+        }
+    }
+
     /// Saves the text that is shown.
     ///
     /// # Errors
@@ -163,6 +180,10 @@ mod tests {
         assert_eq!(texts.text_mut().unwrap(), "// theirs\n");
         texts.show(folder.path(), file, None).unwrap();
         assert!(texts.text_mut().unwrap().ends_with("// mine\n"));
+        let mut again = ShaderTexts::default();
+        texts.show(folder.path(), file, None).unwrap();
+        again.put_back(folder.path(), texts.unsaved(), Some(file.to_owned()));
+        assert_eq!((again.modified(), again.text_mut()), (vec![file], texts.text_mut()));
         texts.save(folder.path()).unwrap();
         assert!(texts.modified().is_empty() && texts.differs_from_built_in());
         assert!(read(folder.path(), file).unwrap().ends_with("// mine\n"));

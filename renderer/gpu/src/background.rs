@@ -13,7 +13,6 @@ use crate::accel::{AccelBuild, AccelStructure, record_builds, record_compaction}
 use crate::buffer::Buffer;
 use crate::context::Device;
 use crate::error::{Context, GpuError};
-use crate::frames::HUNG_AFTER_S;
 use crate::retire::Garbage;
 
 /// Name of this work where an error names a pass.
@@ -116,9 +115,11 @@ impl Background {
         if self.device.background_completed().map_err(name_the_work)? >= ticket.0 {
             return self.take(ticket).map(Some);
         }
-        let hung = |slot: &Slot| slot.value == ticket.0 && slot.since.elapsed().as_secs() >= HUNG_AFTER_S;
+        let seconds = self.device.hung_after_s();
+        let hung = |slot: &Slot| slot.value == ticket.0 && slot.since.elapsed().as_secs() >= seconds;
         if self.running.iter().any(hung) {
-            return Err(timeout());
+            self.device.give_up();
+            return Err(timeout(seconds));
         }
         Ok(None)
     }
@@ -129,7 +130,7 @@ impl Background {
     /// [`GpuError::DeviceLost`] or [`GpuError::Timeout`].
     pub fn wait(&mut self, ticket: Ticket) -> Result<Vec<u64>> {
         let timeline = self.device.background.semaphore;
-        self.device.wait_on(timeline, ticket.0, HUNG_AFTER_S).map_err(name_the_work)?;
+        self.device.wait_on(timeline, ticket.0, self.device.hung_after_s()).map_err(name_the_work)?;
         self.device.background_completed().map_err(name_the_work)?;
         self.take(ticket)
     }
@@ -330,7 +331,7 @@ fn create_slot(device: &Arc<Device>) -> Result<Slot> {
 fn name_the_work(error: GpuError) -> GpuError {
     match error {
         GpuError::DeviceLost { .. } => lost(),
-        GpuError::Timeout { .. } => timeout(),
+        GpuError::Timeout { seconds, .. } => timeout(seconds),
         other => other,
     }
 }
@@ -339,6 +340,6 @@ fn lost() -> GpuError {
     GpuError::DeviceLost { last_pass: String::from("unknown"), next_pass: String::from(LABEL) }
 }
 
-fn timeout() -> GpuError {
-    GpuError::Timeout { seconds: HUNG_AFTER_S, last_pass: format!("the one before '{LABEL}'") }
+fn timeout(seconds: u64) -> GpuError {
+    GpuError::Timeout { seconds, last_pass: String::from("unknown"), next_pass: String::from(LABEL) }
 }

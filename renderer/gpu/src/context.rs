@@ -11,6 +11,7 @@ use gpu_allocator::vulkan::Allocator;
 use crate::barrier::Tracker;
 use crate::device_choice::{self, Candidate, DeviceKind, REQUIRED_EXTENSIONS, Requirements};
 use crate::error::{Context, GpuError};
+use crate::hang::Watched;
 use crate::instance::Instance;
 use crate::retire::{Reached, RetireQueue};
 use crate::{Result, memory};
@@ -74,6 +75,7 @@ pub struct Device {
     pub(crate) background: BackgroundTimeline,
     pub(crate) retired: RetireQueue,
     pub(crate) tracker: Mutex<Tracker>,
+    pub(crate) watched: Watched,
     next_resource: AtomicU64,
     pipeline_cache: vk::PipelineCache,
     limits: Limits,
@@ -128,6 +130,7 @@ impl Device {
             background,
             retired: RetireQueue::default(),
             tracker: Mutex::new(Tracker::default()),
+            watched: Watched::new(candidate.kind),
             next_resource: AtomicU64::new(1),
             pipeline_cache,
             limits: Limits { timestamp_mask: candidate.timestamp_mask, ..limits_of(fns, candidate.physical) },
@@ -228,7 +231,7 @@ impl Device {
     /// Waits until the timeline has reached `value`.
     ///
     /// # Errors
-    /// [`GpuError::Timeout`] after `seconds`; [`GpuError::DeviceLost`].
+    /// [`GpuError::Timeout`] after `seconds`, and nobody waits for the device any more; [`GpuError::DeviceLost`].
     pub fn wait_for(&self, value: u64, seconds: u64) -> Result<()> {
         self.wait_on(self.timeline, value, seconds)
     }
@@ -240,7 +243,9 @@ impl Device {
         // SAFETY: the semaphore lives as long as the device.
         match unsafe { self.raw.wait_semaphores(&info, seconds.saturating_mul(1_000_000_000)) } {
             Err(vk::Result::TIMEOUT) => {
-                Err(GpuError::Timeout { seconds, last_pass: String::from("unknown") })
+                self.give_up();
+                let [last_pass, next_pass] = ["unknown"; 2].map(String::from);
+                Err(GpuError::Timeout { seconds, last_pass, next_pass })
             }
             other => other.during("vkWaitSemaphores"),
         }
@@ -250,8 +255,11 @@ impl Device {
     /// the user-interface renderer; never called in a frame.
     ///
     /// # Errors
-    /// When the device is lost.
+    /// When the device is lost, or was given up.
     pub fn wait_idle(&self) -> Result<()> {
+        if self.is_given_up() {
+            return Err(self.overdue(self.hung_after_s()));
+        }
         let _queues = (self.queue.lock(), self.async_queue.as_ref().map(Mutex::lock));
         // SAFETY: the queues are locked, so nobody submits meanwhile.
         unsafe { self.raw.device_wait_idle() }.during("vkDeviceWaitIdle")?;
@@ -272,6 +280,11 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
+        if self.is_given_up() {
+            // It may still be at work, and would be waited for: it ends with the process.
+            std::mem::forget(Arc::clone(&self.instance));
+            return;
+        }
         // SAFETY: every object that uses the device holds an Arc of it, so this is the last use; after the wait no
         // work is pending. The allocator goes before the device, once.
         unsafe {

@@ -54,12 +54,16 @@ pub enum GpuError {
         next_pass: String,
     },
     /// The device did not finish in time.
-    #[error("the device did not finish within {seconds} s; the last pass that finished was '{last_pass}'")]
+    #[error(
+        "the device did not finish within {seconds} s; the last pass that finished was '{last_pass}', then came '{next_pass}'"
+    )]
     Timeout {
         /// How long was waited.
         seconds: u64,
         /// Label of the last pass known to have finished.
         last_pass: String,
+        /// Label of the pass after it, the likely culprit.
+        next_pass: String,
     },
     /// The surface must be made again at its present size.
     #[error("the window surface is out of date")]
@@ -90,6 +94,16 @@ pub enum GpuError {
         /// What the driver answered.
         result: vk::Result,
     },
+}
+
+impl GpuError {
+    /// The pass that did not finish, when the device is lost or hung; else `None`.
+    pub fn unfinished_pass(&self) -> Option<&str> {
+        match self {
+            Self::DeviceLost { next_pass, .. } | Self::Timeout { next_pass, .. } => Some(next_pass),
+            _ => None,
+        }
+    }
 }
 
 /// Adds the name of the call to a Vulkan result.

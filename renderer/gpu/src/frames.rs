@@ -17,8 +17,6 @@ use crate::timers::{PassTime, Timers};
 
 /// How many frames the host may be ahead of the device.
 const IN_FLIGHT: usize = 2;
-/// After this long without an answer the device counts as hung, seconds.
-pub(crate) const HUNG_AFTER_S: u64 = 300;
 
 struct Slot {
     pool: vk::CommandPool,
@@ -135,6 +133,7 @@ impl Frames {
             .wait_semaphore_infos(&waits)
             .signal_semaphore_infos(&signals)
             .command_buffer_infos(&commands)];
+        timers.watch(value);
         let slot = &mut self.slots[index];
         slot.staging = Some(staging);
         slot.timers = Some(timers);
@@ -147,7 +146,9 @@ impl Frames {
             if let Ok(mut tracker) = device.tracker.lock() {
                 tracker.roll_back();
             }
-            return Err(self.name_the_pass((index + 1) % IN_FLIGHT, error));
+            let error = device.name_the_pass(error);
+            self.slots[index].timers.iter().for_each(Timers::forget);
+            return Err(error);
         }
         if let Ok(mut tracker) = device.tracker.lock() {
             tracker.commit();
@@ -191,9 +192,8 @@ impl Frames {
         if value == 0 {
             return Ok(());
         }
-        if let Err(error) = self.device.wait_for(value, HUNG_AFTER_S) {
-            return Err(self.name_the_pass(self.next, error));
-        }
+        let waited = self.device.wait_for(value, self.device.hung_after_s());
+        waited.map_err(|error| self.device.name_the_pass(error))?;
         if let Some(timers) = &self.slots[index].timers {
             let passes = timers.read();
             if !passes.is_empty() {
@@ -201,23 +201,6 @@ impl Frames {
             }
         }
         Ok(())
-    }
-
-    /// Puts the name of the last pass into an error about a lost or hung device: that of the oldest frame that has not
-    /// finished. `oldest`: the slot that was submitted first.
-    fn name_the_pass(&self, oldest: usize, error: GpuError) -> GpuError {
-        let by_age = (0..IN_FLIGHT).map(|step| &self.slots[(oldest + step) % IN_FLIGHT]);
-        let names: Vec<_> =
-            by_age.filter_map(|slot| slot.timers.as_ref()).map(Timers::last_finished).collect();
-        let unfinished = names.iter().find(|(_, next)| next != "none");
-        let Some((last, next)) = unfinished.or(names.last()).cloned() else {
-            return error;
-        };
-        match error {
-            GpuError::DeviceLost { .. } => lost(&last, &next),
-            GpuError::Timeout { seconds, .. } => GpuError::Timeout { seconds, last_pass: last },
-            other => other,
-        }
     }
 }
 

@@ -13,6 +13,7 @@ mod descriptors;
 mod device_choice;
 mod error;
 mod frames;
+mod hang;
 mod image;
 mod instance;
 mod interface;

@@ -315,6 +315,9 @@ impl Swapchain {
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
+        if self.device.is_given_up() {
+            return;
+        }
         if let Err(error) = self.device.wait_idle() {
             tracing::error!("waiting before closing the window failed: {error}");
         }

@@ -25,7 +25,7 @@ pub struct PassTime {
 pub(crate) struct Timers {
     device: Arc<Device>,
     pool: vk::QueryPool,
-    labels: Vec<String>,
+    labels: Arc<Vec<String>>,
     open: bool,
 }
 
@@ -35,7 +35,7 @@ impl Timers {
             vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(CAPACITY * 2);
         // SAFETY: plain creation; destroyed through the retire queue.
         let pool = unsafe { device.raw.create_query_pool(&info, None) }.during("vkCreateQueryPool")?;
-        let timers = Self { device: Arc::clone(device), pool, labels: Vec::new(), open: false };
+        let timers = Self { device: Arc::clone(device), pool, labels: Arc::default(), open: false };
         timers.reset_pool();
         Ok(timers)
     }
@@ -47,7 +47,8 @@ impl Timers {
 
     /// Starts anew; the frame that used these timers has finished.
     pub(crate) fn reset(&mut self) {
-        self.labels.clear();
+        self.device.watched.end(self.pool);
+        self.labels = Arc::default();
         self.open = false;
         self.reset_pool();
     }
@@ -55,7 +56,7 @@ impl Timers {
     pub(crate) fn begin(&mut self, command: vk::CommandBuffer, label: &str) {
         if (self.labels.len() as u32) < CAPACITY {
             self.write(command, self.labels.len() as u32 * 2);
-            self.labels.push(label.to_owned());
+            Arc::make_mut(&mut self.labels).push(label.to_owned());
             self.open = true;
         }
     }
@@ -106,26 +107,38 @@ impl Timers {
         times
     }
 
-    /// Labels of the last pass whose end was reached and of the one after it.
-    pub(crate) fn last_finished(&self) -> (String, String) {
-        if self.labels.is_empty() {
-            return (String::from("none"), String::from("none"));
-        }
-        let mut ticks = vec![[0_u64; 2]; self.labels.len() * 2];
-        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
-        // SAFETY: the slice holds two 64-bit words a query. NOT_READY fills the availability words all the same.
-        let result = unsafe { self.device.raw.get_query_pool_results(self.pool, 0, &mut ticks, flags) };
-        if matches!(result, Err(error) if error != vk::Result::NOT_READY) {
-            return (String::from("unknown"), self.labels.join(", or "));
-        }
-        let done = ticks.chunks_exact(2).take_while(|pair| pair[1][1] != 0).count();
-        let name = |i: usize| self.labels.get(i).cloned().unwrap_or_else(|| String::from("none"));
-        (if done == 0 { String::from("none") } else { name(done - 1) }, name(done))
+    /// These timestamps are about to be submitted.
+    pub(crate) fn watch(&self, value: u64) {
+        self.device.watched.begin(value, self.pool, Arc::clone(&self.labels));
     }
+
+    /// They were not submitted after all.
+    pub(crate) fn forget(&self) {
+        self.device.watched.end(self.pool);
+    }
+}
+
+/// Labels of the last pass whose end was reached and of the one after it.
+pub(crate) fn last_finished(device: &Device, pool: vk::QueryPool, labels: &[String]) -> (String, String) {
+    if labels.is_empty() {
+        return (String::from("none"), String::from("none"));
+    }
+    let mut ticks = vec![[0_u64; 2]; labels.len() * 2];
+    let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
+    // SAFETY: the slice holds two 64-bit words a query, and whoever resets or destroys the pool waits until it is not watched
+    // any more. NOT_READY fills the availability words all the same.
+    let result = unsafe { device.raw.get_query_pool_results(pool, 0, &mut ticks, flags) };
+    if matches!(result, Err(error) if error != vk::Result::NOT_READY) {
+        return (String::from("unknown"), labels.join(", or "));
+    }
+    let done = ticks.chunks_exact(2).take_while(|pair| pair[1][1] != 0).count();
+    let name = |i: usize| labels.get(i).cloned().unwrap_or_else(|| String::from("none"));
+    (if done == 0 { String::from("none") } else { name(done - 1) }, name(done))
 }
 
 impl Drop for Timers {
     fn drop(&mut self) {
+        self.device.watched.end(self.pool);
         self.device.retire(Garbage::QueryPool(self.pool));
     }
 }

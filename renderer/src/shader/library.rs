@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::time::Duration;
 
 use caustica_gpu::{Device, Interface, ShaderModule};
 
@@ -14,6 +15,7 @@ use super::live::{Live, Make, Owner, Replaceable};
 use super::payloads::RayInterface;
 use super::reflect::reflect;
 use super::sources::{ShaderSources, Source};
+use super::suspects::{HeldShader, Suspects};
 use crate::error::{RendererError, Result};
 
 /// A stage, ready for a pipeline.
@@ -58,6 +60,7 @@ pub struct ShaderLibrary {
     edited: AtomicBool,
     stages: Mutex<HashMap<String, Arc<Compiled>>>,
     replaced: Mutex<Vec<ShaderFault>>,
+    suspects: Mutex<Suspects>,
     live: Mutex<Vec<Weak<dyn Replaceable>>>,
 }
 
@@ -65,9 +68,9 @@ impl ShaderLibrary {
     /// An empty library. `edited`: a stage that is broken when it is needed first is replaced by the built-in one.
     pub fn new(device: &Arc<Device>, sources: ShaderSources, cache: SpirvCache, edited: bool) -> Self {
         let device = Arc::clone(device);
-        let (stages, replaced, live) = Default::default();
+        let (stages, replaced, suspects, live) = Default::default();
         let (sources, edited) = (Mutex::new(sources), AtomicBool::new(edited));
-        Self { device, sources, cache, edited, stages, replaced, live }
+        Self { device, sources, cache, edited, stages, replaced, suspects, live }
     }
 
     /// The stage of a main file; compiled at the first call.
@@ -90,9 +93,57 @@ impl ShaderLibrary {
             },
             other => other?,
         };
+        if self.edited.load(Ordering::Relaxed) {
+            let built_in = ShaderSources::default().load(file).map(|source| source.texts).unwrap_or_default();
+            self.suspect(&stage, &built_in);
+        }
         let stage = Arc::new(stage);
         lock(&self.stages).insert(file.to_owned(), Arc::clone(&stage));
         Ok(stage)
+    }
+
+    /// The stage is used from the next frame on, in the place of these texts.
+    fn suspect(&self, stage: &Compiled, before: &BTreeMap<String, String>) {
+        let frame = self.device.recording();
+        lock(&self.suspects).note(stage.file(), before, &stage.source.texts, frame);
+    }
+
+    /// Shaders that came into use lately and may be why a pass did not finish, which was waited for so long. May be called on
+    /// any thread, like [`Self::held`].
+    pub fn blamed(&self, pass: &str, waited: Duration) -> Vec<HeldShader> {
+        let sources = self.sources();
+        // Of a lost device it is not known how far it came.
+        let done = self.device.completed().unwrap_or(u64::MAX);
+        let mut blamed = lock(&self.suspects).blamed(pass, done, waited);
+        for held in sources.held() {
+            // What took its place did not finish either.
+            if let Some(shader) = blamed.iter_mut().find(|shader| shader.file == held.file) {
+                shader.bad.clone_from(&held.bad);
+            }
+        }
+        blamed
+    }
+
+    /// Shaders that did not finish earlier, and are in their files still.
+    pub fn held(&self) -> Vec<HeldShader> {
+        self.sources().held().cloned().collect()
+    }
+
+    /// Whether a shader came into use so lately that it has not proven itself.
+    pub fn has_suspects(&self) -> bool {
+        lock(&self.suspects).are_new(self.device.recording())
+    }
+
+    /// Files that hold a shader which did not finish, and what is done about it.
+    pub(super) fn held_faults(&self) -> Vec<ShaderFault> {
+        let fault = |held: &HeldShader| {
+            let message = format!(
+                "did not finish (pass {}): the shader before is shown; edit and save the file to try again",
+                held.pass
+            );
+            ShaderFault::whole(&held.file, message)
+        };
+        self.sources().held().map(fault).collect()
     }
 
     /// What was wrong with stages that were needed for the first time, since this was asked last.
@@ -106,7 +157,7 @@ impl ShaderLibrary {
     }
 
     /// The folder that shaders come from.
-    pub(crate) fn folder(&self) -> Option<PathBuf> {
+    pub fn folder(&self) -> Option<PathBuf> {
         lock(&self.sources).folder().map(Path::to_owned)
     }
 
@@ -160,6 +211,11 @@ impl ShaderLibrary {
     /// Takes over stages that were compiled anew. What was made of the old ones and is not in use is made anew when it is.
     pub(super) fn put(&self, stages: Vec<Arc<Compiled>>) {
         let files: BTreeSet<String> = stages.iter().map(|stage| stage.file().to_owned()).collect();
+        for stage in &stages {
+            if let Some(before) = self.known(stage.file()) {
+                self.suspect(stage, &before.source.texts);
+            }
+        }
         lock(&self.stages).extend(stages.into_iter().map(|stage| (stage.file().to_owned(), stage)));
         for live in self.all_live() {
             let stale = live.files().iter().any(|file| files.contains(*file))

@@ -151,7 +151,10 @@ impl Reloader {
     }
 
     pub(crate) fn status(&self) -> ShaderStatus {
-        ShaderStatus { compiling: self.compiling.load(Ordering::Relaxed), ..self.status.clone() }
+        let mut status =
+            ShaderStatus { compiling: self.compiling.load(Ordering::Relaxed), ..self.status.clone() };
+        status.faults.extend(self.library.held_faults());
+        status
     }
 
     /// Whether there is something to take over.

@@ -3,9 +3,12 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use include_dir::{Dir, include_dir};
 
+use super::suspects::HeldShader;
 use crate::error::{RendererError, Result};
 
 /// The shaders as they were when this binary was built.
@@ -15,6 +18,15 @@ static EMBEDDED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../shaders");
 #[derive(Clone, Debug, Default)]
 pub struct ShaderSources {
     folder: Option<PathBuf>,
+    held: Arc<Vec<Hold>>,
+}
+
+/// A text that is not used.
+#[derive(Debug)]
+struct Hold {
+    shader: HeldShader,
+    /// Whether the file holds it, as far as is known.
+    in_force: AtomicBool,
 }
 
 /// A main file with everything it includes.
@@ -29,7 +41,19 @@ pub struct Source {
 impl ShaderSources {
     /// Reads from `folder`, or from the copy in the binary when it is `None`.
     pub fn new(folder: Option<PathBuf>) -> Self {
-        Self { folder }
+        Self { folder, held: Arc::default() }
+    }
+
+    /// The same folder, with other texts in the place of those that did not finish.
+    #[must_use]
+    pub fn holding(self, held: Vec<HeldShader>) -> Self {
+        let hold = |shader| Hold { shader, in_force: AtomicBool::new(true) };
+        Self { held: Arc::new(held.into_iter().map(hold).collect()), ..self }
+    }
+
+    /// Shaders that did not finish and are in their files still.
+    pub fn held(&self) -> impl Iterator<Item = &HeldShader> {
+        self.held.iter().filter(|hold| hold.in_force.load(Ordering::Relaxed)).map(|hold| &hold.shader)
     }
 
     /// The folder, where it is not the copy in the binary.
@@ -59,13 +83,23 @@ impl ShaderSources {
             return Err(refuse(String::from("a shader path must stay inside the shader folder")));
         }
         match &self.folder {
-            Some(folder) => read_file(&folder.join(file)).map_err(refuse),
+            Some(folder) => {
+                read_file(&folder.join(file)).map(|text| self.without_held(file, text)).map_err(refuse)
+            }
             None => EMBEDDED
                 .get_file(file)
                 .and_then(include_dir::File::contents_utf8)
                 .map(str::to_owned)
                 .ok_or_else(|| refuse(String::from("no such file in the built-in shaders"))),
         }
+    }
+
+    /// The text before, in the place of one that did not finish.
+    fn without_held(&self, file: &str, text: String) -> String {
+        let Some(hold) = self.held.iter().find(|hold| hold.shader.file == file) else { return text };
+        let in_force = hold.shader.bad == text;
+        hold.in_force.store(in_force, Ordering::Relaxed);
+        if in_force { hold.shader.good.clone() } else { text }
     }
 
     /// Reads a main file and follows its includes.
@@ -114,6 +148,7 @@ fn includes_of(text: &str) -> impl Iterator<Item = &str> {
 }
 
 #[cfg(test)]
+#[expect(clippy::expect_used, reason = "a test says what is wrong by panicking")]
 mod tests {
     use super::*;
 
@@ -122,6 +157,20 @@ mod tests {
         let text =
             "#include \"a.glsl\"\n  #  include  \"b/c.glsl\" // why\n// #include \"no.glsl\"\n#define X\n";
         assert_eq!(includes_of(text).collect::<Vec<_>>(), ["a.glsl", "b/c.glsl"]);
+    }
+
+    #[test]
+    fn a_text_that_did_not_finish_is_not_used_until_its_file_has_another_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let held =
+            HeldShader { file: "a.comp".into(), bad: "bad".into(), good: "good".into(), pass: "a".into() };
+        let sources = ShaderSources::new(Some(folder.path().to_owned())).holding(vec![held]);
+        let read = |text: &str| {
+            std::fs::write(folder.path().join("a.comp"), text).expect("a file");
+            (sources.read("a.comp").expect("a text"), sources.held().count())
+        };
+        assert_eq!(read("bad"), ("good".to_owned(), 1));
+        assert_eq!(read("better"), ("better".to_owned(), 0));
     }
 
     #[test]

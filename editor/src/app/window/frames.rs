@@ -4,6 +4,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use caustica_renderer::RendererError;
 use caustica_renderer::gpu::{Access, GpuError, Recorder, Stage, Use};
 use egui::ViewportId;
 use egui::epaint::ClippedPrimitive;
@@ -32,6 +33,7 @@ impl EditorWindow {
         let output = self.context.run_ui(input, |ui| self.editor.ui(ui));
         self.input.handle_platform_output(&self.window, output.platform_output);
         self.set_title();
+        self.keep();
         let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
         self.ui.set_textures(output.textures_delta)?;
         let recorder = self.picture()?;
@@ -258,15 +260,17 @@ impl EditorWindow {
     }
 }
 
-/// Whether the device is gone, so that nothing can be drawn any more.
+/// The error that the device is gone, so that nothing can be drawn any more, if it is that.
+pub(super) fn device_gone(error: &anyhow::Error) -> Option<&GpuError> {
+    error.chain().find_map(|cause| {
+        let gpu = match cause.downcast_ref::<RendererError>() {
+            Some(RendererError::Gpu(gpu)) => Some(gpu),
+            _ => cause.downcast_ref::<GpuError>(),
+        };
+        gpu.filter(|gpu| gpu.unfinished_pass().is_some())
+    })
+}
+
 fn is_fatal(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        matches!(
-            cause.downcast_ref::<GpuError>(),
-            Some(GpuError::DeviceLost { .. } | GpuError::Timeout { .. })
-        )
-    }) || matches!(
-        error.downcast_ref::<caustica_renderer::RendererError>(),
-        Some(caustica_renderer::RendererError::Gpu(GpuError::DeviceLost { .. } | GpuError::Timeout { .. }))
-    )
+    device_gone(error).is_some()
 }

@@ -1,0 +1,122 @@
+//! What the device works at, for whoever asks while it does not answer. Enters: every submission of frames. Leaves: the oldest
+//! one that is unfinished, and the pass that it stands in. Any thread may ask, also while another one waits in the driver.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use ash::vk;
+
+use crate::Result;
+use crate::context::Device;
+use crate::device_choice::DeviceKind;
+use crate::error::GpuError;
+use crate::timers::last_finished;
+
+/// A device that works at one submission for longer counts as hung, seconds. A processor compiles shaders when they are used
+/// first, which takes long.
+const HUNG_AFTER_S: u64 = 60;
+const PROCESSOR_HUNG_AFTER_S: u64 = 300;
+/// The same where a shader was edited just before.
+const SUSPECT_AFTER_S: u64 = 10;
+const PROCESSOR_SUSPECT_AFTER_S: u64 = 60;
+/// Sets it, for tests.
+const VARIABLE: &str = "CAUSTICA_HUNG_AFTER_S";
+
+/// A submission, with the timestamps around its passes.
+struct Submitted {
+    value: u64,
+    pool: vk::QueryPool,
+    labels: Arc<Vec<String>>,
+}
+
+/// Submissions of frames that were not seen to have finished, oldest first.
+pub(crate) struct Watched {
+    submitted: Mutex<Vec<Submitted>>,
+    hung_after_s: u64,
+    suspect_after_s: u64,
+    given_up: AtomicBool,
+}
+
+impl Watched {
+    pub(crate) fn new(kind: DeviceKind) -> Self {
+        let set = std::env::var(VARIABLE).ok().and_then(|text| text.parse().ok()).filter(|s| *s > 0);
+        let [hung, suspect] = match kind {
+            DeviceKind::Cpu => [PROCESSOR_HUNG_AFTER_S, PROCESSOR_SUSPECT_AFTER_S],
+            _ => [HUNG_AFTER_S, SUSPECT_AFTER_S],
+        };
+        Self {
+            submitted: Mutex::default(),
+            hung_after_s: set.unwrap_or(hung),
+            suspect_after_s: set.unwrap_or(suspect),
+            given_up: AtomicBool::new(false),
+        }
+    }
+
+    /// To be called before the submission: the driver may not come back from it.
+    pub(crate) fn begin(&self, value: u64, pool: vk::QueryPool, labels: Arc<Vec<String>>) {
+        if let Ok(mut submitted) = self.submitted.lock() {
+            submitted.push(Submitted { value, pool, labels });
+        }
+    }
+
+    /// To be called before the timestamps are reset or destroyed.
+    pub(crate) fn end(&self, pool: vk::QueryPool) {
+        if let Ok(mut submitted) = self.submitted.lock() {
+            submitted.retain(|work| work.pool != pool);
+        }
+    }
+}
+
+impl Device {
+    /// A device that works at one submission for longer counts as hung, seconds; `CAUSTICA_HUNG_AFTER_S` sets it.
+    pub fn hung_after_s(&self) -> u64 {
+        self.watched.hung_after_s
+    }
+
+    /// The same where a shader was edited just before, which is then likely to be the reason.
+    pub fn suspect_after_s(&self) -> u64 {
+        self.watched.suspect_after_s
+    }
+
+    /// Timeline value of the oldest submission of a frame that has not finished; `None`: nothing is left to do.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn works_at(&self) -> Result<Option<u64>> {
+        let completed = self.completed()?;
+        let Ok(submitted) = self.watched.submitted.lock() else { return Ok(None) };
+        Ok(submitted.iter().map(|work| work.value).find(|value| *value > completed))
+    }
+
+    /// The error that the device has not finished within `seconds`, with the names of passes.
+    pub fn overdue(&self, seconds: u64) -> GpuError {
+        let unknown = || String::from("unknown");
+        self.name_the_pass(GpuError::Timeout { seconds, last_pass: unknown(), next_pass: unknown() })
+    }
+
+    /// Puts names of passes into an error about a lost or hung device: those of the oldest submission that has not finished.
+    pub fn name_the_pass(&self, error: GpuError) -> GpuError {
+        if !matches!(error, GpuError::DeviceLost { .. } | GpuError::Timeout { .. }) {
+            return error;
+        }
+        let Ok(submitted) = self.watched.submitted.lock() else { return error };
+        let names: Vec<_> =
+            submitted.iter().map(|work| last_finished(self, work.pool, &work.labels)).collect();
+        let unfinished = names.iter().find(|(_, next)| next != "none");
+        let Some((last_pass, next_pass)) = unfinished.or(names.last()).cloned() else { return error };
+        match error {
+            GpuError::Timeout { seconds, .. } => GpuError::Timeout { seconds, last_pass, next_pass },
+            _ => GpuError::DeviceLost { last_pass, next_pass },
+        }
+    }
+
+    /// Nobody waits for the device any more: what it was given may never end. What it uses is not destroyed, as that would wait.
+    pub fn give_up(&self) {
+        self.watched.given_up.store(true, Ordering::Release);
+    }
+
+    /// Whether nobody waits for the device any more.
+    pub fn is_given_up(&self) -> bool {
+        self.watched.given_up.load(Ordering::Acquire)
+    }
+}

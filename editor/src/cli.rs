@@ -16,6 +16,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Duration;
 
 use caustica_renderer::RendererError;
 use caustica_renderer::gpu::{Device, DeviceOptions, GpuError, Instance, InstanceOptions, Requirements};
@@ -23,6 +24,7 @@ use caustica_scene::import::Warning;
 use caustica_scene::{Document, Local, Project, ShapeSource};
 use clap::{Args, Parser, Subcommand};
 
+use crate::device_watch::{DeviceWatch, end};
 use crate::recovery;
 use crate::session::{Loaded, load};
 use crate::ui_state::Config;
@@ -88,6 +90,17 @@ impl DeviceArgs {
         let instance = Instance::new(InstanceOptions { validation: self.validation, display: None })?;
         let requirements = Requirements { device: self.device.clone(), present: false };
         Device::new(&instance, &DeviceOptions { requirements, memory_limit_bytes: self.memory_limit_bytes() })
+    }
+
+    /// Ends the program with an error when the device does not come back, for as long as the answer is kept.
+    fn watch(device: &Arc<Device>) -> Option<DeviceWatch> {
+        let watched = Arc::clone(device);
+        let hung = move |waited: Duration| {
+            eprintln!("error: {}", watched.overdue(waited.as_secs()));
+            end(EXIT_DEVICE);
+        };
+        let watch = DeviceWatch::start(device, |_| false, hung);
+        watch.inspect_err(|error| tracing::warn!("a device that hangs is not noticed: {error}")).ok()
     }
 
     fn memory_limit_bytes(&self) -> Option<u64> {

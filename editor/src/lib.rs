@@ -5,6 +5,7 @@ pub mod app;
 mod camera_control;
 pub mod cli;
 mod default_sky;
+mod device_watch;
 mod dialogs;
 mod gizmo;
 pub mod history;

@@ -1,15 +1,13 @@
 //! When the device does not come back: the program starts again in the place of its own process, with everything as it was and
 //! without the shader that is to blame. Enters: what to keep, after every frame. Leaves: a file for the next process, which
-//! `app/after_hang.rs` makes use of. A thread of its own looks at the device, as the driver may never answer the others.
+//! `app/after_hang.rs` makes use of.
 
 use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{anyhow, bail};
@@ -18,19 +16,17 @@ use caustica_renderer::shader::ShaderLibrary;
 
 use super::after_hang::AfterHang;
 use crate::cli::EXIT_DEVICE;
+use crate::device_watch::{DeviceWatch, end};
 
 /// Option of the command line that names the file for the next process.
 pub const OPTION: &str = "--after-hang";
 /// A device that is lost again so soon after a start, with no shader to blame, would be lost for ever.
 const NOT_AGAIN_WITHIN: Duration = Duration::from_secs(60);
-/// So long the end of a process may take whose driver does not answer.
-const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
 /// See the head of the file.
 pub(super) struct Rescue {
     shared: Arc<Shared>,
-    stop: Option<Sender<()>>,
-    thread: Option<JoinHandle<()>>,
+    _watch: Option<DeviceWatch>,
 }
 
 struct Shared {
@@ -54,13 +50,14 @@ impl Rescue {
             started_again: started_again.then(Instant::now),
             ends: AtomicBool::new(false),
         });
-        let (stop, stopped) = channel();
-        let watched = Arc::clone(&shared);
-        let thread = std::thread::Builder::new()
-            .name("device watch".to_owned())
-            .spawn(move || watch(&watched, &stopped))
-            .inspect_err(|error| tracing::warn!("a device that hangs will not be noticed: {error}"));
-        Self { shared, stop: Some(stop), thread: thread.ok() }
+        let (suspect, rescued) = (Arc::clone(&shared), Arc::clone(&shared));
+        let watch = DeviceWatch::start(
+            device,
+            move |waited| is_suspect(&suspect, waited),
+            move |waited| rescue(&rescued, waited),
+        );
+        let watch = watch.inspect_err(|error| tracing::warn!("a device that hangs is not noticed: {error}"));
+        Self { shared, _watch: watch.ok() }
     }
 
     /// Keeps what the program looks like now.
@@ -79,19 +76,7 @@ impl Rescue {
     pub(super) fn start_again(&self, error: &GpuError) -> anyhow::Error {
         self.shared.start_again(error)
     }
-}
 
-impl Drop for Rescue {
-    fn drop(&mut self) {
-        self.stop = None;
-        if let Some(thread) = self.thread.take() {
-            // It never panics, and nothing could be done about it.
-            let _ = thread.join();
-        }
-    }
-}
-
-impl Rescue {
     /// From now on a device that does not come back ends the program.
     pub(super) fn leave(&self) {
         self.shared.ends.store(true, Ordering::Release);
@@ -145,30 +130,6 @@ impl Shared {
     }
 }
 
-/// Looks at the device now and then until the window is closed.
-fn watch(shared: &Shared, stopped: &Receiver<()>) {
-    let device = &shared.device;
-    let (soon, late) =
-        (Duration::from_secs(device.suspect_after_s()), Duration::from_secs(device.hung_after_s()));
-    let pause = (soon / 8).clamp(Duration::from_millis(50), Duration::from_secs(1));
-    // Counted in looks, not by the clock: a process that was stopped meanwhile has not waited.
-    let (mut stands_at, mut stood) = (None, Duration::ZERO);
-    while let Err(RecvTimeoutError::Timeout) = stopped.recv_timeout(pause) {
-        if device.is_given_up() {
-            // Whoever did that sees to the rest.
-            continue;
-        }
-        // A lost device is noticed by the next frame, unless that never comes.
-        let at = device.works_at().unwrap_or(Some(u64::MAX));
-        stood = if at.is_some() && at == stands_at { stood + pause } else { Duration::ZERO };
-        stands_at = at;
-        if stood >= late || stood >= soon && is_suspect(shared, stood) {
-            device.give_up();
-            rescue(shared, stood);
-        }
-    }
-}
-
 fn is_suspect(shared: &Shared, waited: Duration) -> bool {
     let error = shared.device.overdue(waited.as_secs());
     !shared.shaders.blamed(error.unfinished_pass().unwrap_or_default(), waited).is_empty()
@@ -183,19 +144,7 @@ fn rescue(shared: &Shared, waited: Duration) {
     let why = shared.start_again(&error);
     // The thread of the window may never come back from the driver: it ends here.
     eprintln!("error: {error}: {why:#}; unsaved changes are kept: start the editor again to recover them");
-    end(EXIT_DEVICE.into());
-}
-
-/// Ends the process, also when the driver does not let it clean up.
-fn end(code: i32) -> ! {
-    let backstop = std::thread::Builder::new().spawn(|| {
-        std::thread::sleep(ENDS_WITHIN);
-        std::process::abort();
-    });
-    if let Err(error) = backstop {
-        tracing::debug!("no thread to end the process: {error}");
-    }
-    std::process::exit(code)
+    end(EXIT_DEVICE);
 }
 
 /// Brings the journal to the disk. The kernel has it already, which outlives the process.

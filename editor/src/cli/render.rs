@@ -71,6 +71,7 @@ pub(super) fn run(
     })?;
     let environment = args.environment.as_deref().map(environment_argument).transpose()?;
     let device = device.open()?;
+    let _watch = DeviceArgs::watch(&device);
     let mut session = Session::new(
         &device,
         SessionOptions { shaders, watch_shaders, extent: args.size, ..SessionOptions::default() },

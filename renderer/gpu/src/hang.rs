@@ -10,7 +10,6 @@ use crate::Result;
 use crate::context::Device;
 use crate::device_choice::DeviceKind;
 use crate::error::GpuError;
-use crate::timers::last_finished;
 
 /// A device that works at one submission for longer counts as hung, seconds. A processor compiles shaders when they are used
 /// first, which takes long.
@@ -22,16 +21,37 @@ const PROCESSOR_SUSPECT_AFTER_S: u64 = 60;
 /// Sets it, for tests.
 const VARIABLE: &str = "CAUSTICA_HUNG_AFTER_S";
 
-/// A submission, with the timestamps around its passes.
-struct Submitted {
-    value: u64,
-    pool: vk::QueryPool,
-    labels: Arc<Vec<String>>,
+/// The passes of a submission.
+pub(crate) struct Passes {
+    pub(crate) value: u64,
+    pub(crate) pool: vk::QueryPool,
+    pub(crate) labels: Arc<Vec<String>>,
+    /// One a label; set once the pass is through.
+    pub(crate) events: Vec<vk::Event>,
+}
+
+impl Passes {
+    /// Labels of the last pass that is known to be through, and of the one after it.
+    fn last_finished(&self, device: &Device) -> (String, String) {
+        let mut done = 0_usize;
+        for event in &self.events {
+            // SAFETY: whoever resets or destroys the events waits until they are not watched any more.
+            match unsafe { device.raw.get_event_status(*event) } {
+                Ok(true) => done += 1,
+                Ok(false) => break,
+                Err(_) => return (String::from("unknown"), self.labels.join(", or ")),
+            }
+        }
+        let name = |index: Option<usize>| {
+            index.and_then(|index| self.labels.get(index)).cloned().unwrap_or_else(|| String::from("none"))
+        };
+        (name(done.checked_sub(1)), name(Some(done)))
+    }
 }
 
 /// Submissions of frames that were not seen to have finished, oldest first.
 pub(crate) struct Watched {
-    submitted: Mutex<Vec<Submitted>>,
+    submitted: Mutex<Vec<Passes>>,
     hung_after_s: u64,
     suspect_after_s: u64,
     given_up: AtomicBool,
@@ -53,13 +73,13 @@ impl Watched {
     }
 
     /// To be called before the submission: the driver may not come back from it.
-    pub(crate) fn begin(&self, value: u64, pool: vk::QueryPool, labels: Arc<Vec<String>>) {
+    pub(crate) fn begin(&self, passes: Passes) {
         if let Ok(mut submitted) = self.submitted.lock() {
-            submitted.push(Submitted { value, pool, labels });
+            submitted.push(passes);
         }
     }
 
-    /// To be called before the timestamps are reset or destroyed.
+    /// To be called before timestamps and events are reset or destroyed.
     pub(crate) fn end(&self, pool: vk::QueryPool) {
         if let Ok(mut submitted) = self.submitted.lock() {
             submitted.retain(|work| work.pool != pool);
@@ -100,8 +120,7 @@ impl Device {
             return error;
         }
         let Ok(submitted) = self.watched.submitted.lock() else { return error };
-        let names: Vec<_> =
-            submitted.iter().map(|work| last_finished(self, work.pool, &work.labels)).collect();
+        let names: Vec<_> = submitted.iter().map(|passes| passes.last_finished(self)).collect();
         let unfinished = names.iter().find(|(_, next)| next != "none");
         let Some((last_pass, next_pass)) = unfinished.or(names.last()).cloned() else { return error };
         match error {

@@ -24,6 +24,7 @@ pub(crate) enum Garbage {
     SetLayout(vk::DescriptorSetLayout),
     CommandPool(vk::CommandPool),
     QueryPool(vk::QueryPool),
+    Events(Vec<vk::Event>),
     Semaphore(vk::Semaphore),
     ImageViews(Vec<vk::ImageView>),
     Swapchain(vk::SwapchainKHR),
@@ -134,6 +135,7 @@ fn destroy(device: &Device, garbage: Garbage) {
             Garbage::SetLayout(layout) => raw.destroy_descriptor_set_layout(layout, None),
             Garbage::CommandPool(pool) => raw.destroy_command_pool(pool, None),
             Garbage::QueryPool(pool) => raw.destroy_query_pool(pool, None),
+            Garbage::Events(events) => events.into_iter().for_each(|event| raw.destroy_event(event, None)),
             Garbage::Semaphore(semaphore) => raw.destroy_semaphore(semaphore, None),
             Garbage::ImageViews(views) => {
                 views.into_iter().for_each(|view| raw.destroy_image_view(view, None))

@@ -1,4 +1,5 @@
-//! Timestamps around passes. Enters: labels in order. Leaves: milliseconds a label once the frame has finished.
+//! Timestamps around passes, and events at their ends. Enters: labels in order. Leaves: milliseconds a label once the frame has
+//! finished, and before that how far the device has come.
 
 use std::sync::Arc;
 
@@ -7,6 +8,7 @@ use ash::vk;
 use crate::Result;
 use crate::context::Device;
 use crate::error::Context;
+use crate::hang::Passes;
 use crate::retire::Garbage;
 
 /// Most passes in a frame that are timed.
@@ -26,6 +28,8 @@ pub(crate) struct Timers {
     device: Arc<Device>,
     pool: vk::QueryPool,
     labels: Arc<Vec<String>>,
+    /// One a pass, which its end sets. Unlike timestamps they can be asked for by every driver while the device is at work.
+    events: Vec<vk::Event>,
     open: bool,
 }
 
@@ -35,7 +39,13 @@ impl Timers {
             vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(CAPACITY * 2);
         // SAFETY: plain creation; destroyed through the retire queue.
         let pool = unsafe { device.raw.create_query_pool(&info, None) }.during("vkCreateQueryPool")?;
-        let timers = Self { device: Arc::clone(device), pool, labels: Arc::default(), open: false };
+        let timers = Self {
+            device: Arc::clone(device),
+            pool,
+            labels: Arc::default(),
+            events: Vec::new(),
+            open: false,
+        };
         timers.reset_pool();
         Ok(timers)
     }
@@ -48,13 +58,20 @@ impl Timers {
     /// Starts anew; the frame that used these timers has finished.
     pub(crate) fn reset(&mut self) {
         self.device.watched.end(self.pool);
+        for event in self.events.iter().take(self.labels.len()) {
+            // SAFETY: the frame that used the event has finished, and nobody asks for it any more.
+            if let Err(error) = unsafe { self.device.raw.reset_event(*event) } {
+                tracing::debug!("an event stays set: {error}");
+            }
+        }
         self.labels = Arc::default();
         self.open = false;
         self.reset_pool();
     }
 
     pub(crate) fn begin(&mut self, command: vk::CommandBuffer, label: &str) {
-        if (self.labels.len() as u32) < CAPACITY {
+        let index = self.labels.len();
+        if (index as u32) < CAPACITY && self.event(index).is_some() {
             self.write(command, self.labels.len() as u32 * 2);
             Arc::make_mut(&mut self.labels).push(label.to_owned());
             self.open = true;
@@ -65,6 +82,7 @@ impl Timers {
         if self.open {
             self.write(command, self.labels.len() as u32 * 2 - 1);
             self.open = false;
+            self.mark(command, self.labels.len() - 1);
         }
     }
 
@@ -78,6 +96,16 @@ impl Timers {
                 query,
             );
         }
+    }
+
+    /// Has the event of a pass set when the pass is through.
+    fn mark(&self, command: vk::CommandBuffer, index: usize) {
+        let Some(event) = self.events.get(index) else { return };
+        let stages = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let memory = [vk::MemoryBarrier2::default().src_stage_mask(stages).dst_stage_mask(stages)];
+        let after = vk::DependencyInfo::default().memory_barriers(&memory);
+        // SAFETY: the command buffer is being recorded outside of a rendering scope, and the event was reset.
+        unsafe { self.device.raw.cmd_set_event2(command, *event, &after) };
     }
 
     /// Reads the times of a finished frame; passes of the same label are added up.
@@ -107,38 +135,38 @@ impl Timers {
         times
     }
 
-    /// These timestamps are about to be submitted.
+    /// The passes are about to be submitted.
     pub(crate) fn watch(&self, value: u64) {
-        self.device.watched.begin(value, self.pool, Arc::clone(&self.labels));
+        let events = self.events.iter().copied().take(self.labels.len()).collect();
+        self.device.watched.begin(Passes {
+            value,
+            pool: self.pool,
+            labels: Arc::clone(&self.labels),
+            events,
+        });
     }
 
     /// They were not submitted after all.
     pub(crate) fn forget(&self) {
         self.device.watched.end(self.pool);
     }
-}
 
-/// Labels of the last pass whose end was reached and of the one after it.
-pub(crate) fn last_finished(device: &Device, pool: vk::QueryPool, labels: &[String]) -> (String, String) {
-    if labels.is_empty() {
-        return (String::from("none"), String::from("none"));
+    /// The event that the end of a pass sets.
+    fn event(&mut self, index: usize) -> Option<vk::Event> {
+        if index == self.events.len() {
+            let info = vk::EventCreateInfo::default();
+            // SAFETY: plain creation; destroyed through the retire queue.
+            let made = unsafe { self.device.raw.create_event(&info, None) };
+            self.events.extend(made.inspect_err(|error| tracing::debug!("no event: {error}")));
+        }
+        self.events.get(index).copied()
     }
-    let mut ticks = vec![[0_u64; 2]; labels.len() * 2];
-    let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
-    // SAFETY: the slice holds two 64-bit words a query, and whoever resets or destroys the pool waits until it is not watched
-    // any more. NOT_READY fills the availability words all the same.
-    let result = unsafe { device.raw.get_query_pool_results(pool, 0, &mut ticks, flags) };
-    if matches!(result, Err(error) if error != vk::Result::NOT_READY) {
-        return (String::from("unknown"), labels.join(", or "));
-    }
-    let done = ticks.chunks_exact(2).take_while(|pair| pair[1][1] != 0).count();
-    let name = |i: usize| labels.get(i).cloned().unwrap_or_else(|| String::from("none"));
-    (if done == 0 { String::from("none") } else { name(done - 1) }, name(done))
 }
 
 impl Drop for Timers {
     fn drop(&mut self) {
         self.device.watched.end(self.pool);
+        self.device.retire(Garbage::Events(std::mem::take(&mut self.events)));
         self.device.retire(Garbage::QueryPool(self.pool));
     }
 }

@@ -17,6 +17,11 @@ use image::RgbImage;
 const WINDOW: [u32; 2] = [1000, 700];
 /// Where the cube is in it.
 const MIDDLE: [u32; 2] = [WINDOW[0] * 48 / 100, WINDOW[1] * 43 / 100];
+/// Where the part of the view begins that is looked at.
+const VIEW: [u32; 2] = [WINDOW[0] * 32 / 100, WINDOW[1] * 20 / 100];
+/// The cube's row in the outliner, and the tab of the shaders.
+const ROW: [u32; 2] = [60, 150];
+const SHADERS: [u32; 2] = [673, 515];
 /// A device that takes longer counts as hung. On a processor the first pictures take several seconds.
 const HUNG_AFTER_S: &str = "25";
 /// So long anything may take before the test gives up.
@@ -48,15 +53,15 @@ fn copy(from: &Path, to: &Path) {
 }
 
 /// The shader with a statement before the one that stores the picture; `imageStore` is an effect that no compiler leaves out.
-fn post_with(folder: &Path, statement: &str) -> String {
-    let text = fs::read_to_string(folder.join("shaders").join(POST)).expect("a shader");
+fn post_with(statement: &str) -> String {
+    let text = fs::read_to_string(shader_folder().join(POST)).expect("a shader");
     let store = "    imageStore(display,";
     assert!(text.contains(store), "{text}");
     text.replacen(store, &format!("    {statement}\n{store}"), 1)
 }
 
-fn endless(folder: &Path) -> String {
-    post_with(folder, "for (uint n = 0u; n < 2u; n &= 1u) { imageStore(display, ivec2(pixel), vec4(n)); }")
+fn endless() -> String {
+    post_with("for (uint n = 0u; n < 2u; n &= 1u) { imageStore(display, ivec2(pixel), vec4(n)); }")
 }
 
 struct Editor<'a> {
@@ -76,10 +81,16 @@ impl<'a> Editor<'a> {
         command.stdout(log.try_clone().expect("a log")).stderr(log);
         let mut editor =
             Self { process: command.spawn().expect("the editor starts"), desktop, log: log_path };
-        let window = editor.wait_for("the window", |desktop| desktop.window("Caustica"));
+        let window = editor.focus();
         desktop.xdotool(&format!("windowsize {window} {} {}", WINDOW[0], WINDOW[1]));
-        desktop.xdotool(&format!("windowfocus {window}"));
         editor
+    }
+
+    /// Keys go to the window, which there is no window manager to see to.
+    fn focus(&mut self) -> String {
+        let window = self.wait_for("the window", |desktop| desktop.window("Caustica"));
+        self.desktop.xdotool(&format!("windowfocus {window}"));
+        window
     }
 
     fn log(&self) -> String {
@@ -133,9 +144,8 @@ impl Drop for Editor<'_> {
 
 /// The middle of the view, with the cube, its outline and the gizmo.
 fn view(desktop: &Desktop) -> RgbImage {
-    let [left, top] = [WINDOW[0] * 32 / 100, WINDOW[1] * 20 / 100];
-    let [width, height] = [WINDOW[0] * 32 / 100, WINDOW[1] * 42 / 100];
-    image::imageops::crop_imm(&desktop.screenshot(), left, top, width, height).to_image()
+    let [width, height] = [WINDOW[0] * 32 / 100, WINDOW[1] * 40 / 100];
+    image::imageops::crop_imm(&desktop.screenshot(), VIEW[0], VIEW[1], width, height).to_image()
 }
 
 /// Squares of 16 pixels whose mean brightness differs visibly: noise evens out.
@@ -149,9 +159,26 @@ fn differing(a: &RgbImage, b: &RgbImage) -> usize {
     corners.filter(|&(x, y)| (mean(a, x, y) - mean(b, x, y)).abs() > 12.0).count()
 }
 
+/// A point of the red handle of the gizmo, away from its ends.
+fn red_handle(desktop: &Desktop) -> Option<[u32; 2]> {
+    let view = view(desktop);
+    let red = view.enumerate_pixels().filter(|(_, _, p)| p.0[0] > 200 && p.0[1] < 100 && p.0[2] < 110);
+    let mut points: Vec<[u32; 2]> = red.map(|(x, y, _)| [x + VIEW[0], y + VIEW[1]]).collect();
+    points.sort_unstable();
+    // The head of the arrow holds most of the red: three quarters of the way is on it or close before it.
+    (points.len() > 30).then(|| points[points.len() * 3 / 4])
+}
+
 /// Pixels of the orange outline of what is selected.
 fn outline(view: &RgbImage) -> usize {
     view.pixels().filter(|p| p.0[0] > 230 && (115..165).contains(&p.0[1]) && p.0[2] < 70).count()
+}
+
+/// Red pixels in the panel below the view.
+fn errors(desktop: &Desktop) -> usize {
+    let screen = desktop.screenshot();
+    let panel = image::imageops::crop_imm(&screen, 180, 530, 590, 130).to_image();
+    panel.pixels().filter(|p| p.0[0] > 180 && p.0[1] < 130 && p.0[2] < 130).count()
 }
 
 fn shows_cube(desktop: &Desktop) -> Option<()> {
@@ -168,40 +195,39 @@ fn the_editor_comes_back_as_it_was_without_the_shader_that_never_ends() {
     let desktop = Desktop::start([1600, 960]);
     let mut editor = Editor::start(&desktop, folder.path(), &project);
     editor.wait_for("the cube", shows_cube);
-    // An edit that is not saved, a selection, a camera that was moved.
-    desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", MIDDLE[0], MIDDLE[1]));
+    // A selection, an edit that is not saved, a camera that was moved, another panel in front.
+    desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 1", ROW[0], ROW[1]));
     editor.wait_for("the outline of the cube", |desktop| (outline(&view(desktop)) > 200).then_some(()));
-    desktop.xdotool("key ctrl+d");
+    let handle = editor.wait_for("the gizmo", red_handle);
+    desktop.drag(handle, [60, 0]);
     editor.wait_for_modified(true);
-    desktop.xdotool("click 4 sleep 0.3 click 4 sleep 0.3");
-    desktop.xdotool(&format!("mousemove {} {}", WINDOW[0] * 48 / 100, WINDOW[1] * 98 / 100));
+    desktop.xdotool(&format!("mousemove {} {} sleep 0.3 click 5 sleep 0.3 click 5", MIDDLE[0], MIDDLE[1]));
+    // With time in between: what is under the pointer is found out once a frame.
+    desktop.xdotool(&format!("sleep 2 mousemove {} {} sleep 2 click 1 sleep 2", SHADERS[0], SHADERS[1]));
+    desktop.xdotool(&format!("mousemove {} 12", MIDDLE[0]));
     let before = editor.settled();
+    assert!(errors(&desktop) == 0, "nothing is wrong yet");
 
-    let (bad, file) = (endless(folder.path()), folder.path().join("shaders").join(POST));
+    let (bad, file) = (endless(), folder.path().join("shaders").join(POST));
     fs::write(&file, &bad).expect("a saved shader");
     editor.wait_for_log("the program is started again");
+    editor.wait_for_log(&format!("{POST} did not finish (pass post)"));
     editor.wait_for("the cube again", shows_cube);
+    editor.focus();
     editor.wait_for_modified(true);
     let after = editor.settled();
     let differing_squares = differing(&before, &after);
     assert!(differing_squares <= 4, "{differing_squares} squares differ");
     assert!(outline(&after) > 200, "the selection is gone");
-    let log = editor.log();
-    assert!(log.contains(&format!("{POST} did not finish (pass post)")), "{log}");
+    assert!(errors(&desktop) > 50, "the panel of the shaders is in front and says what is wrong");
     assert_eq!(fs::read_to_string(&file).expect("a shader"), bad, "the file is left alone");
 
     // The edit can be undone, as before.
     desktop.xdotool("key ctrl+z");
     editor.wait_for_modified(false);
     // A shader that ends is shown again.
-    let shaders = folder.path().join("shaders");
-    fs::write(&file, fs::read_to_string(shader_folder().join(POST)).expect("a shader")).expect("a shader");
-    let dark = post_with(
-        folder.path(),
-        "if (pixel.x > 0u) { imageStore(display, ivec2(pixel), vec4(0.0)); return; }",
-    );
-    fs::write(shaders.join(POST), dark).expect("a saved shader");
-    editor.wait_for_log(&format!("shaders: {POST} taken over"));
+    let dark = post_with("if (pixel.x > 0u) { imageStore(display, ivec2(pixel), vec4(0.0)); return; }");
+    fs::write(&file, dark).expect("a saved shader");
     editor.wait_for("a dark picture", |desktop| {
         let view = view(desktop);
         (view.pixels().filter(|pixel| pixel.0.iter().all(|c| *c < 40)).count() > 40_000).then_some(())
@@ -223,7 +249,7 @@ fn the_editor_comes_back_as_it_was_without_the_shader_that_never_ends() {
 fn render_names_the_pass_that_never_ends_and_ends_itself() {
     let folder = tempfile::tempdir().expect("a folder");
     let project = write_project(folder.path());
-    fs::write(folder.path().join("shaders").join(POST), endless(folder.path())).expect("a saved shader");
+    fs::write(folder.path().join("shaders").join(POST), endless()).expect("a saved shader");
     let mut command = std::process::Command::new(program());
     command.arg("render").arg(&project).args(["-o", "out.png", "--size", "64x48", "--samples", "1"]);
     command.arg("--shaders").arg(folder.path().join("shaders")).env("CAUSTICA_HUNG_AFTER_S", HUNG_AFTER_S);

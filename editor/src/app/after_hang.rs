@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use caustica_renderer::ViewSettings;
 use caustica_renderer::shader::HeldShader;
 use caustica_scene::Target;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::editor::Editor;
 use super::files::Purpose;
@@ -31,6 +31,7 @@ pub struct AfterHang {
     /// Shaders that did not finish.
     pub held: Vec<HeldShader>,
     /// Layout and all else that is kept between runs.
+    #[serde(deserialize_with = "mended")]
     pub config: Config,
     /// The active one last.
     pub selection: Vec<Target>,
@@ -48,6 +49,10 @@ pub struct AfterHang {
     pub typed: BTreeMap<String, String>,
     /// The shader that is open.
     pub shown_shader: Option<String>,
+}
+
+fn mended<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Config, D::Error> {
+    Config::of_json(serde_json::Value::deserialize(deserializer)?).map_err(serde::de::Error::custom)
 }
 
 impl AfterHang {
@@ -146,5 +151,32 @@ impl Editor {
             self.state.outliner.reveal(document, active);
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use super::*;
+    use crate::ui_state::{Tab, default_layout};
+
+    #[test]
+    fn it_is_read_once_with_panels_that_were_never_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("after-hang.json");
+        let mut layout = default_layout();
+        layout.retain_tabs(|tab| *tab != Tab::Log);
+        let config = Config { layout: Some(layout), dark: false, ..Config::default() };
+        let selection =
+            vec![Target::part(caustica_scene::NodeId(3), 1), Target::node(caustica_scene::NodeId(2))];
+        let after =
+            AfterHang { config, selection: selection.clone(), time_s: Some(0.5), ..AfterHang::default() };
+        std::fs::write(&path, serde_json::to_string(&after).unwrap()).unwrap();
+        let again = AfterHang::take(&path).unwrap();
+        assert_eq!((again.selection, again.time_s, again.camera), (selection, Some(0.5), after.camera));
+        let layout = again.config.layout.unwrap();
+        assert!(!again.config.dark && layout.find_tab(&Tab::Log).is_none());
+        assert!(AfterHang::take(&path).is_none());
     }
 }

@@ -140,6 +140,7 @@ pub(super) fn run(
     shaders: Option<PathBuf>,
 ) -> anyhow::Result<ExitCode> {
     let device = device.open()?;
+    let _watch = DeviceArgs::watch(&device);
     let progress = !args.json && std::io::stderr().is_terminal();
     let bench = Bench {
         device: Arc::clone(&device),

@@ -51,6 +51,7 @@ fn list(args: &DevicesArgs) -> anyhow::Result<ExitCode> {
 
 fn measure(args: &DevicesArgs, device: &DeviceArgs) -> anyhow::Result<ExitCode> {
     let device = device.open()?;
+    let _watch = DeviceArgs::watch(&device);
     let progress = if args.json || !std::io::stderr().is_terminal() {
         ProgressBar::hidden()
     } else {

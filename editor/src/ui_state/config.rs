@@ -166,7 +166,14 @@ impl Config {
     }
 
     fn parse(text: &str) -> serde_json::Result<Self> {
-        let mut value = serde_json::from_str(text)?;
+        Self::of_json(serde_json::from_str(text)?)
+    }
+
+    /// Reads what [`serde_json`] made of one; odd values are mended.
+    ///
+    /// # Errors
+    /// When it says something else.
+    pub fn of_json(mut value: serde_json::Value) -> serde_json::Result<Self> {
         mend_places(&mut value);
         let mut config: Self = serde_json::from_value(value)?;
         // A layout without a view is of no use.

@@ -183,7 +183,8 @@ mod tests {
         let mut again = ShaderTexts::default();
         texts.show(folder.path(), file, None).unwrap();
         again.put_back(folder.path(), texts.unsaved(), Some(file.to_owned()));
-        assert_eq!((again.modified(), again.text_mut()), (vec![file], texts.text_mut()));
+        assert_eq!(again.modified(), [file]);
+        assert_eq!(again.text_mut(), texts.text_mut());
         texts.save(folder.path()).unwrap();
         assert!(texts.modified().is_empty() && texts.differs_from_built_in());
         assert!(read(folder.path(), file).unwrap().ends_with("// mine\n"));

@@ -43,6 +43,7 @@ fn new_session(gpu: &gpu::Session, needs: NeedsMode, acceleration: Option<AccelP
     let options = SessionOptions {
         shaders: shaders_under_test(),
         watch_shaders: None,
+        held_shaders: Vec::new(),
         settings: settings(Pipeline::Hybrid, needs),
         extent: SMALL,
         window: false,

@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::assets::{Environment, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId};
-use crate::import::Warning;
+use crate::import::{Warning, plain};
 
 mod animation;
 mod buffer;
@@ -90,7 +90,7 @@ impl ExportError {
 
 impl fmt::Display for ExportError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.file.display(), self.reason)
+        f.write_str(&plain(&format!("{}: {}", self.file.display(), self.reason)))
     }
 }
 

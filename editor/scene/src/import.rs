@@ -22,6 +22,7 @@ mod uri;
 mod watched;
 
 pub use environment::load_environment;
+pub(crate) use error::plain;
 pub use error::{ImportError, Warning};
 pub use shapes::load_shapes;
 pub(crate) use uri::{is_address, leads_out};

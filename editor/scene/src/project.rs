@@ -3,6 +3,7 @@
 //! It refuses newer versions in words, keeps what it does not know, and never leaves half a file.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -11,7 +12,7 @@ use serde_json::{Map, Value};
 use crate::assets::TextureUse;
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, TextureId};
-use crate::import::{ImportOptions, Warning};
+use crate::import::{ImportOptions, Warning, plain};
 
 pub(crate) mod atomic;
 mod journal;
@@ -125,14 +126,21 @@ impl ProjectMeta {
 }
 
 /// Why a project cannot be read or saved.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", file.display())]
+#[derive(Debug)]
 pub struct ProjectError {
     /// The project file.
     pub file: PathBuf,
     /// What is wrong.
     pub problem: ProjectProblem,
 }
+
+impl fmt::Display for ProjectError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&plain(&format!("{}: {}", self.file.display(), self.problem)))
+    }
+}
+
+impl std::error::Error for ProjectError {}
 
 /// What is wrong with a project.
 #[derive(Debug, thiserror::Error)]

@@ -3,6 +3,18 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+/// Text that may come from a file: control characters in it, which a terminal would obey, as escapes.
+pub(crate) fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c.is_control() {
+            true => plain.extend(c.escape_default()),
+            false => plain.push(c),
+        }
+    }
+    plain
+}
+
 /// Why a file cannot be imported.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImportError {
@@ -29,11 +41,7 @@ impl ImportError {
 
 impl fmt::Display for ImportError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.file.display())?;
-        if !self.place.is_empty() {
-            write!(f, "{}: ", self.place)?;
-        }
-        f.write_str(&self.reason)
+        told(f, &self.file, &self.place, &self.reason)
     }
 }
 
@@ -52,10 +60,27 @@ pub struct Warning {
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.file.display())?;
-        if !self.place.is_empty() {
-            write!(f, "{}: ", self.place)?;
-        }
-        f.write_str(&self.message)
+        told(f, &self.file, &self.place, &self.message)
+    }
+}
+
+fn told(f: &mut fmt::Formatter<'_>, file: &Path, place: &str, what: &str) -> fmt::Result {
+    let colon = if place.is_empty() { "" } else { ": " };
+    f.write_str(&plain(&format!("{}: {place}{colon}{what}", file.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_control_character_of_a_file_is_shown() {
+        let place = "/nodes/\u{1b}]0;x\u{7}".to_owned();
+        let error =
+            ImportError::new(Path::new("a\u{9b}.obj"), "\u{1b}[2J\r\n\u{7f} \u{e9}").at(place.clone());
+        let shown = "a\\u{9b}.obj: /nodes/\\u{1b}]0;x\\u{7}: \\u{1b}[2J\\r\\n\\u{7f} \u{e9}";
+        assert_eq!(error.to_string(), shown);
+        let warning = Warning { file: error.file, place, message: error.reason };
+        assert_eq!(warning.to_string(), shown);
     }
 }

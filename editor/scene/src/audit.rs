@@ -2,74 +2,25 @@
 //! In: a document. Out: findings that name what they are about. It changes nothing.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use glam::DAffine3;
 
 use crate::animation::ClipChoice;
 use crate::assets::{AlphaMode, Material, Mesh, ShapeSource};
 use crate::document::Document;
-use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
+use crate::ids::{MaterialId, MeshId, Target, TextureId};
 use crate::import::geometry::has_no_area;
 use crate::node::NodeKind;
 use crate::transform::is_degenerate;
+
+mod finding;
+
+pub use finding::{Finding, Severity, Subject};
 
 /// Longest by shortest axis of a transform above which single precision gets coarse.
 const LARGE_SCALE_RATIO: f64 = 1e4;
 /// Distance from the origin, in sizes of the object, above which single precision alone would show steps.
 const FAR_IN_SIZES: f64 = 1e6;
-
-/// How bad a finding is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Severity {
-    /// Worth knowing.
-    Info,
-    /// It will look wrong or cost precision.
-    Warning,
-    /// It cannot be rendered and is left out.
-    Error,
-}
-
-/// What a finding is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Subject {
-    /// A node or part.
-    Target(Target),
-    /// A prefab.
-    Prefab(PrefabId),
-    /// A mesh.
-    Mesh(MeshId),
-    /// A material.
-    Material(MaterialId),
-    /// A texture.
-    Texture(TextureId),
-    /// The scene as a whole.
-    Scene,
-}
-
-/// One result of the audit.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    /// How bad it is.
-    pub severity: Severity,
-    /// What it is about.
-    pub subject: Subject,
-    /// Name of the subject, to show.
-    pub name: String,
-    /// In words, with what to do where that is not plain.
-    pub message: String,
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let severity = match self.severity {
-            Severity::Info => "note",
-            Severity::Warning => "warning",
-            Severity::Error => "error",
-        };
-        write!(f, "{severity}: {}: {}", self.name, self.message)
-    }
-}
 
 /// Looks through a document; the worst findings come first, then in order of subject.
 pub fn audit(document: &Document) -> Vec<Finding> {
@@ -98,22 +49,7 @@ struct Audit<'a> {
 
 impl Audit<'_> {
     fn add(&mut self, severity: Severity, subject: Subject, name: &str, message: String) {
-        let id = match subject {
-            Subject::Target(target) => target.node.0,
-            Subject::Prefab(id) => id.0,
-            Subject::Mesh(id) => id.0,
-            Subject::Material(id) => id.0,
-            Subject::Texture(id) => id.0,
-            Subject::Scene => 0,
-        };
-        let kind = match subject {
-            Subject::Target(_) => "node",
-            Subject::Prefab(_) => "prefab",
-            Subject::Mesh(_) => "mesh",
-            Subject::Material(_) => "material",
-            Subject::Texture(_) => "texture",
-            Subject::Scene => "scene",
-        };
+        let (kind, id) = subject.kind_and_id();
         self.findings.push(Finding { severity, subject, name: crate::edit::shown(name, kind, id), message });
     }
 

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use caustica_scene::import::{Warning, load_environment};
-use caustica_scene::{Document, Edit, Environment, EnvironmentFile, Finding, Mesh, Severity, audit};
+use caustica_scene::{
+    Document, Edit, Environment, EnvironmentFile, Finding, Mesh, Severity, Subject, Target, audit,
+};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -98,7 +100,7 @@ impl Report {
     }
 
     fn json(&self, file: &Path) -> Value {
-        let finding = |f: &Finding| json!({ "severity": format!("{:?}", f.severity).to_lowercase(), "message": f.message });
+        let finding = |f: &Finding| json!({ "severity": format!("{:?}", f.severity).to_lowercase(), "subject": subject(f), "message": f.message });
         json!({
             "file": file,
             "errors": self.errors(),
@@ -113,7 +115,7 @@ impl Report {
 
     fn say(&self, file: &Path) {
         for finding in &self.findings {
-            say!("{:?}: {}", finding.severity, finding.message);
+            say!("{:?}: {}", finding.severity, finding.about());
         }
         say!(
             "{}: {} triangles, {} spheres and boxes, {} materials, {} textures, {} import warnings, {} findings, {} errors",
@@ -127,4 +129,14 @@ impl Report {
             self.errors()
         );
     }
+}
+
+/// What a finding is about: kind, name and id, and the number of a part.
+fn subject(finding: &Finding) -> Value {
+    let (kind, id) = finding.subject.kind_and_id();
+    let mut value = json!({ "kind": kind, "name": finding.name, "id": id });
+    if let Subject::Target(Target { part: Some(part), .. }) = finding.subject {
+        value["part"] = part.into();
+    }
+    value
 }

@@ -123,6 +123,10 @@ pub(crate) enum Pointed {
     Light(usize),
     /// A camera, likewise.
     Camera(usize),
+    /// A light that no part carries, by place in [`Foreign::spare_lights`].
+    SpareLight(usize),
+    /// A camera, likewise.
+    SpareCamera(usize),
     /// The file as a whole.
     File,
 }

@@ -127,6 +127,12 @@ impl<'a> Sources<'a> {
         spare
     }
 
+    /// How many of them come before those of a source.
+    pub fn spare_before(&self, id: PrefabId, find: impl Fn(&'a Foreign) -> &'a Vec<Value>) -> usize {
+        let before = self.prefabs.iter().take_while(|(of, _)| *of != id);
+        before.map(|(_, prefab)| find(&prefab.foreign).len()).sum()
+    }
+
     /// What of the sources is lost: of which, what, and how often.
     pub fn lost(&self) -> impl Iterator<Item = (&'a Prefab, &'a str, usize)> {
         let of = |(_, prefab): &(PrefabId, &'a Prefab)| {

@@ -97,6 +97,11 @@ impl Pool {
         })
     }
 
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
     /// The values in order.
     pub fn into_list(self) -> Vec<Value> {
         self.list

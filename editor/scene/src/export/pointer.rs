@@ -17,6 +17,7 @@ use crate::import::gltf::is_read;
 
 /// Name of the extension.
 const NAME: &str = "KHR_animation_pointer";
+const LIGHTS: &str = "/extensions/KHR_lights_punctual/lights";
 
 /// The places of everything in the file.
 pub(super) struct Places<'a> {
@@ -99,9 +100,18 @@ impl Places<'_> {
             }
             Pointed::Light(number) => {
                 let places = numbered(self.lights, number).unwrap_or_default();
-                ("/extensions/KHR_lights_punctual/lights", places)
+                (LIGHTS, places)
             }
             Pointed::Camera(number) => ("/cameras", numbered(self.cameras, number).unwrap_or_default()),
+            // They follow those that nodes carry.
+            Pointed::SpareLight(number) => {
+                let before = self.sources.spare_before(id, |foreign| &foreign.spare_lights);
+                (LIGHTS, [self.lights.pool.len() + before + number].into())
+            }
+            Pointed::SpareCamera(number) => {
+                let before = self.sources.spare_before(id, |foreign| &foreign.spare_cameras);
+                ("/cameras", [self.cameras.pool.len() + before + number].into())
+            }
         };
         places.into_iter().map(|place| at(&format!("{list}/{place}/{rest}"))).collect()
     }

@@ -360,3 +360,47 @@ fn an_export_has_every_channel() {
     let second = crate::export::exported(&crate::export::placed(again), folder.path(), "again.glb").0;
     assert!(std::fs::read(written).unwrap() == std::fs::read(second).unwrap(), "a second export is the same");
 }
+
+/// Channels of a light and a camera that no node has come back; what moves nothing, and a camera that was refused, are counted.
+#[test]
+fn what_no_node_has_is_kept_or_counted() {
+    let mut clip = Clip::new();
+    let camera = |yfov: f32| json!({"type": "perspective", "perspective": {"yfov": yfov, "znear": 0.1}});
+    for yfov in [-1.0, -2.0, 0.75] {
+        clip.file.push("cameras", camera(yfov));
+    }
+    clip.file.json["nodes"][0]["camera"] = json!(1);
+    let lights = clip.file.json["extensions"]["KHR_lights_punctual"]["lights"].as_array_mut().unwrap();
+    lights.insert(0, json!({"type": "point", "name": "spare"}));
+    for node in [2, 3] {
+        clip.file.json["nodes"][node]["extensions"]["KHR_lights_punctual"]["light"] = json!(1);
+    }
+    clip.line(&format!("{LIGHT}/intensity"), "SCALAR", &[10., 30.]);
+    clip.line("/cameras/3/perspective/yfov", "SCALAR", &[0.5, 0.75]);
+    clip.line("/cameras/1/perspective/yfov", "SCALAR", &[0.5, 0.75]);
+    clip.channels.push(json!({"sampler": 0, "target": {"path": "translation"}}));
+    let folder = tempfile::tempdir().unwrap();
+    let document = crate::export::placed(clip.read(folder.path()));
+    let (written, done) = crate::export::exported(&document, folder.path(), "out.glb");
+    let file = crate::export::json_of(&written);
+    let angles: Vec<&Value> =
+        file["cameras"].as_array().unwrap().iter().map(|c| &c["perspective"]["yfov"]).collect();
+    assert_eq!(angles, [&json!(0.5), &json!(0.75)]);
+    assert_eq!(file["extensions"]["KHR_lights_punctual"]["lights"][1]["name"], "spare");
+    let channels = file["animations"][0]["channels"].as_array().unwrap();
+    let pointer =
+        |channel: &Value| channel["target"]["extensions"]["KHR_animation_pointer"]["pointer"].clone();
+    let pointers: Vec<Value> = channels.iter().map(pointer).collect();
+    let light = "/extensions/KHR_lights_punctual/lights/1/intensity";
+    assert_eq!(pointers, [light, "/cameras/1/perspective/yfov"]);
+    let said: Vec<&str> = done.warnings.iter().map(|warning| warning.message.as_str()).collect();
+    for words in [
+        "a camera that cannot be used is left out (2 times)",
+        "a channel of the clip \"\" that moves nothing is left out (2 times)",
+    ] {
+        assert!(said.contains(&words), "{words}: {said:#?}");
+    }
+    let again = crate::export::placed(crate::export::read(&written));
+    let (second, _) = crate::export::exported(&again, folder.path(), "again.glb");
+    assert!(std::fs::read(written).unwrap() == std::fs::read(second).unwrap(), "a second export is the same");
+}

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use super::accessor::{Accessors, Component};
+use super::foreign::carried;
 use super::json::{Fault, Item};
 use super::node::Tree;
 use crate::animation::{Animation, Channel, ChannelPath, Interpolation};
@@ -24,17 +25,20 @@ pub(super) fn read_all(
     tree: &mut Tree,
 ) -> Result<(Vec<Arc<Animation>>, Unplayed), Fault> {
     let mut warnings = Vec::new();
+    let mut lost = Vec::new();
     let nodes = root.objects("nodes")?;
-    let reader = Reader { accessors, meshes, materials, nodes, tree };
+    let (lights, cameras) = carried(root)?;
+    let reader = Reader { accessors, meshes, materials, nodes, lights, cameras, tree };
     let (mut clips, mut kept) = (Vec::new(), BTreeMap::new());
     for (place, item) in root.objects("animations")?.iter().enumerate() {
-        let (clip, unplayed) = reader.read(item, &mut warnings)?;
+        let (clip, unplayed) = reader.read(item, &mut warnings, &mut lost)?;
         clips.push(Arc::new(clip));
         if !unplayed.is_empty() {
             kept.insert(place, unplayed);
         }
     }
     tree.warnings.append(&mut warnings);
+    tree.lost.append(&mut lost);
     Ok((clips, kept))
 }
 
@@ -46,6 +50,8 @@ struct Reader<'a> {
     meshes: &'a [Mesh],
     materials: &'a [Material],
     nodes: Vec<Item<'a>>,
+    lights: Vec<Item<'a>>,
+    cameras: Vec<Item<'a>>,
     tree: &'a Tree,
 }
 
@@ -57,6 +63,7 @@ impl Reader<'_> {
         &self,
         item: &Item<'_>,
         warnings: &mut Vec<Fault>,
+        lost: &mut Vec<String>,
     ) -> Result<(Animation, Vec<KeptChannel>), Fault> {
         let samplers = item.objects("samplers")?;
         let (mut channels, mut kept) = (Vec::new(), Vec::new());
@@ -68,6 +75,13 @@ impl Reader<'_> {
                 continue;
             };
             match self.read_channel(sampler, &target)? {
+                // Nothing in the scene has what it changes.
+                Ok(read) if read.is_empty() => match self.unplayed(sampler, &target)? {
+                    Some(unplayed) => kept.push(unplayed),
+                    None => {
+                        lost.push(format!("a channel of the clip \"{}\" that moves nothing", item.name()?))
+                    }
+                },
                 Ok(read) => {
                     for read in read {
                         if !seen.insert((read.part, read.path)) {

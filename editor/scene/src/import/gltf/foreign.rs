@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 use super::check;
 use super::json::{Fault, Item};
 use super::mesh::Meshes;
-use super::node::Tree;
+use super::node::{Tree, read_camera};
 use crate::foreign::{Foreign, Kept, KeptSkin, Unknown};
 
 /// Extensions that hold indices of nodes, meshes, images, accessors or buffer views.
@@ -49,7 +49,7 @@ pub(super) fn read(
         ..Foreign::default()
     };
     for what in std::mem::take(&mut tree.lost) {
-        *foreign.lost.entry(what.to_owned()).or_default() += 1;
+        *foreign.lost.entry(what).or_default() += 1;
     }
     // Read on its own.
     foreign.file.within.remove("asset");
@@ -82,8 +82,18 @@ pub(super) fn read(
         foreign.skins.insert(place as usize, kept);
     }
     let (lights, cameras) = carried(root)?;
-    (foreign.lights, foreign.spare_lights) = kept_of(tree, &lights, |part| tree.light_of.get(&part))?;
-    (foreign.cameras, foreign.spare_cameras) = kept_of(tree, &cameras, |part| tree.camera_of.get(&part))?;
+    foreign.lights = kept_of(&tree.light_of, &lights)?;
+    foreign.cameras = kept_of(&tree.camera_of, &cameras)?;
+    let values = |items: &[Item<'_>], spare: &[usize]| {
+        spare.iter().filter_map(|&place| items.get(place)).map(|item| item.value().clone()).collect()
+    };
+    foreign.spare_lights = values(&lights, &spare_lights(&lights, tree));
+    foreign.spare_cameras = values(&cameras, &spare_cameras(&cameras, tree));
+    let cameras_kept = numbers_of(&tree.camera_of).len() + foreign.spare_cameras.len();
+    if cameras_kept < cameras.len() {
+        let what = "a camera that cannot be used".to_owned();
+        foreign.lost.insert(what, cameras.len() - cameras_kept);
+    }
     count_pointing(root.value(), &mut foreign.lost);
     Ok(foreign)
 }
@@ -103,25 +113,31 @@ fn of_scene(scene: &Item<'_>) -> Unknown {
     unknown(scene, if is_ours { &["environment"] } else { &[] })
 }
 
-/// What is kept of the lights or cameras that parts carry, and those that none does. `which`: by part.
-fn kept_of<'a>(
-    tree: &Tree,
-    items: &[Item<'_>],
-    which: impl Fn(u32) -> Option<&'a usize>,
-) -> Result<(BTreeMap<u32, Kept>, Vec<Value>), Fault> {
-    let mut numbers: BTreeMap<usize, usize> = BTreeMap::new();
+/// What is kept of the lights or cameras that parts carry. `carried`: by part.
+fn kept_of(carried: &BTreeMap<u32, usize>, items: &[Item<'_>]) -> Result<BTreeMap<u32, Kept>, Fault> {
+    let numbers = numbers_of(carried);
     let mut kept = BTreeMap::new();
-    for part in 0..tree.parts.len() as u32 {
-        let Some((index, item)) = which(part).and_then(|&index| Some((index, items.get(index)?))) else {
-            continue;
-        };
-        let next = numbers.len();
-        let number = *numbers.entry(index).or_insert(next);
+    for (&part, index) in carried {
+        let Some((item, &number)) = items.get(*index).zip(numbers.get(index)) else { continue };
         let size = if item.text("type")? == Some("directional") { "angle" } else { "radius" };
         kept.insert(part, Kept { number, name: item.name()?, unknown: unknown(item, &[size]) });
     }
-    let spare = items.iter().enumerate().filter(|(index, _)| !numbers.contains_key(index));
-    Ok((kept, spare.map(|(_, item)| item.value().clone()).collect()))
+    Ok(kept)
+}
+
+/// Places of the lights that no part carries.
+pub(super) fn spare_lights(lights: &[Item<'_>], tree: &Tree) -> Vec<usize> {
+    let carried = numbers_of(&tree.light_of);
+    (0..lights.len()).filter(|place| !carried.contains_key(place)).collect()
+}
+
+/// Places of the cameras that no part carries and that can be used.
+pub(super) fn spare_cameras(cameras: &[Item<'_>], tree: &Tree) -> Vec<usize> {
+    let carried = numbers_of(&tree.camera_of);
+    let usable = |item: &Item<'_>| matches!(read_camera(item, &mut Vec::new()), Ok(Some(_)));
+    let spare =
+        cameras.iter().enumerate().filter(|(place, item)| !carried.contains_key(place) && usable(item));
+    spare.map(|(place, _)| place).collect()
 }
 
 /// The numbers that [`Kept`] gives to what parts carry, by place in the file.

@@ -42,7 +42,7 @@ pub(super) struct Tree {
     /// Meshes of nothing but points and lines, by the part that places them.
     pub loose_parts: BTreeMap<u32, usize>,
     /// What of parts cannot be kept, in words.
-    pub lost: Vec<&'static str>,
+    pub lost: Vec<String>,
     /// How many GPU instances follow a part that has some.
     pub instanced: BTreeMap<u32, u32>,
     pub warnings: Vec<Fault>,
@@ -195,7 +195,7 @@ impl Reader<'_> {
                     "the GPU instances of points or lines",
                 ),
             ];
-            tree.lost.extend(more.into_iter().filter(|(has, _)| *has).map(|(_, what)| what));
+            tree.lost.extend(more.into_iter().filter(|(has, _)| *has).map(|(_, what)| what.to_owned()));
         }
         let light = self.read_light_of(item, part, tree)?;
         let camera = match item.index("camera", self.cameras.len(), "camera")? {
@@ -401,7 +401,7 @@ fn read_light(item: &Item<'_>, node: &Item<'_>, warnings: &mut Vec<Fault>) -> Re
 }
 
 /// A camera that cannot be used is left out with a warning.
-fn read_camera(item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Option<Camera>, Fault> {
+pub(super) fn read_camera(item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Option<Camera>, Fault> {
     let optional = |item: &Item<'_>, key: &str| {
         item.f64(key).map(|v| v.map(|v| v as f32).filter(|v| v.is_finite() && *v > 0.0))
     };

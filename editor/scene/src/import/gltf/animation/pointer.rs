@@ -2,7 +2,7 @@
 //! the file. In: the pointer. Out: what channels change, or nothing where that cannot be animated.
 
 use super::super::check;
-use super::super::foreign::numbers_of;
+use super::super::foreign::{numbers_of, spare_cameras, spare_lights};
 use super::super::json::{Fault, Item};
 use super::{Reader, Targets};
 use crate::animation::{ChannelPath, Property};
@@ -88,10 +88,16 @@ impl Reader<'_> {
             return (material < self.materials.len()).then_some((Pointed::Material(material), rest));
         }
         if let Some((light, rest)) = split(pointer, LIGHTS) {
-            return Some((Pointed::Light(*numbers_of(&self.tree.light_of).get(&light)?), rest));
+            let carried = numbers_of(&self.tree.light_of).get(&light).copied();
+            let spare = || spare_lights(&self.lights, self.tree).iter().position(|&place| place == light);
+            let of = carried.map(Pointed::Light).or_else(|| spare().map(Pointed::SpareLight));
+            return Some((of?, rest));
         }
         if let Some((camera, rest)) = split(pointer, "/cameras/") {
-            return Some((Pointed::Camera(*numbers_of(&self.tree.camera_of).get(&camera)?), rest));
+            let carried = numbers_of(&self.tree.camera_of).get(&camera).copied();
+            let spare = || spare_cameras(&self.cameras, self.tree).iter().position(|&place| place == camera);
+            let of = carried.map(Pointed::Camera).or_else(|| spare().map(Pointed::SpareCamera));
+            return Some((of?, rest));
         }
         let rest = pointer.strip_prefix("/extensions/")?;
         let is_kept = !check::is_read(rest.split('/').next()?);

@@ -60,6 +60,8 @@ pub(crate) struct Foreign {
 pub(crate) struct Mapping {
     pub material: usize,
     pub variants: Vec<usize>,
+    pub name: String,
+    pub unknown: Unknown,
 }
 
 /// What is kept of one object.
@@ -189,6 +191,9 @@ impl Foreign {
         let carried = self.lights.values().chain(self.cameras.values()).map(|kept| &kept.unknown);
         let textures = self.textures.values().flat_map(|kept| [&kept.unknown, &kept.image, &kept.sampler]);
         let loose = self.loose.values().flat_map(|mesh| &mesh.primitives).map(|loose| &loose.unknown);
+        let loose_mappings =
+            self.loose.values().flat_map(|mesh| &mesh.primitives).map(|loose| &loose.mappings);
+        let mappings = self.mappings.values().chain(loose_mappings).flatten().map(|mapping| &mapping.unknown);
         [&self.asset, &self.file]
             .into_iter()
             .chain(&self.scenes)
@@ -199,5 +204,6 @@ impl Foreign {
             .chain(self.skins.values().map(|skin| &skin.unknown))
             .chain(self.clips.values())
             .chain(loose)
+            .chain(mappings)
     }
 }

@@ -269,15 +269,17 @@ impl<'a> Sources<'a> {
         used: &mut Extensions,
     ) {
         let (Some(prefab), Some(first)) = (self.prefab(id), self.first_variant.get(&id)) else { return };
-        let mapping = |mapping: &Mapping| {
+        let mut mapping = |mapping: &Mapping| {
             let material = places.get(prefab.materials.get(mapping.material)?)?;
             let mut object = Object::new();
             object.put("material", *material);
             object.put("variants", mapping.variants.iter().map(|v| v + first).collect::<Vec<_>>());
+            object.put_text("name", &mapping.name);
+            self.put(&mut object, Some((id, &mapping.unknown)), Object::new(), used);
             Some(Value::Object(object))
         };
         let mut value = Object::new();
-        value.put("mappings", mappings.iter().filter_map(mapping).collect::<Vec<_>>());
+        value.put("mappings", mappings.iter().filter_map(&mut mapping).collect::<Vec<_>>());
         used.put(object, "KHR_materials_variants", value);
     }
 

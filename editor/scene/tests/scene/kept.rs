@@ -147,8 +147,13 @@ fn what_cannot_be_kept_is_counted_by_name() {
     file.json["nodes"][0]["extensions"] = json!({"MSFT_lod": {"ids": [1]}});
     file.json["materials"][0]["normalTexture"] = json!({"index": 0});
     file.json["nodes"][3]["extensions"] = json!({"KHR_node_visibility": {"visible": true, "extras": 1}});
+    let instanced = json!({"attributes": {"TRANSLATION": position, "_ID": own}});
+    for _ in 0..2 {
+        file.push("nodes", json!({"mesh": 1, "extensions": {"EXT_mesh_gpu_instancing": instanced}}));
+    }
     let (_, said) = through(&file.write(folder.path()), folder.path());
     for words in [
+        "the attribute _ID of GPU instances is left out (2 times)",
         "the attribute _OWN of triangles is left out (2 times)",
         "a texture that no material has is left out",
         "MSFT_lod, which points into the lists of the file is left out",
@@ -248,4 +253,23 @@ fn a_moved_instance_keeps_its_points() {
         nodes.filter(|node| node["mesh"].as_u64() == Some(mesh)).count()
     };
     assert_eq!((places(0), places(1)), (2, 2), "two instances share the meshes");
+}
+
+#[test]
+fn names_and_extras_of_what_variants_choose_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = loose_file();
+    file.json["extensionsUsed"] = json!(["KHR_materials_variants", "ACME_thing"]);
+    file.json["extensions"] = json!({"KHR_materials_variants": {"variants": [{"name": "bare"}]}});
+    let mapping = json!({"material": 0, "variants": [0], "name": "first",
+        "extras": strange("mapping"), "extensions": acme("mapping")});
+    for primitive in file.json["meshes"][0]["primitives"].as_array_mut().unwrap() {
+        primitive["extensions"] = json!({"KHR_materials_variants": {"mappings": [mapping]}});
+    }
+    let (after, said) = through(&file.write(folder.path()), folder.path());
+    for primitive in after["meshes"][0]["primitives"].as_array().unwrap() {
+        assert_eq!(primitive["extensions"]["KHR_materials_variants"]["mappings"], json!([mapping]));
+    }
+    assert_eq!(after["extensionsUsed"], json!(["ACME_thing", "KHR_materials_variants"]));
+    assert_eq!(said, Vec::<String>::new());
 }

@@ -177,6 +177,8 @@ pub(super) fn read_mappings(extension: &Item<'_>, materials: usize) -> Result<Ve
             material: item.required_index("material", materials, "material")?,
             // Checked with the other references.
             variants: item.indices("variants", usize::MAX, "variant")?,
+            name: item.name()?,
+            unknown: unknown(item, &[]),
         })
     };
     extension.objects("mappings")?.iter().map(mapping).collect()

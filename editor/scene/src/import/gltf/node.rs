@@ -214,7 +214,10 @@ impl Reader<'_> {
             None => true,
         };
         let instances = match (mesh, item.extension("EXT_mesh_gpu_instancing")?) {
-            (Some(_), Some(extension)) => self.read_instances(&extension)?,
+            (Some(_), Some(extension)) => {
+                tree.lost.extend(lost_attributes(&extension)?);
+                self.read_instances(&extension)?
+            }
             _ => None,
         };
         let local = read_local(item, &mut tree.warnings)?;
@@ -305,6 +308,14 @@ impl Reader<'_> {
         };
         Ok(Some((0..count).map(instance).collect()))
     }
+}
+
+/// Attributes of GPU instances that are not read.
+fn lost_attributes(instancing: &Item<'_>) -> Result<Vec<String>, Fault> {
+    let Some(attributes) = instancing.child("attributes")? else { return Ok(Vec::new()) };
+    let is_read = |name: &str| ["TRANSLATION", "ROTATION", "SCALE"].contains(&name);
+    let names = attributes.object()?.keys().filter(|name| !is_read(name));
+    Ok(names.map(|name| format!("the attribute {name} of GPU instances")).collect())
 }
 
 /// `None` for a rotation without direction.

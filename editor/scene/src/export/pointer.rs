@@ -168,12 +168,14 @@ fn complete_one(object: &mut Value, rest: &str, used: &mut Extensions) {
     let mut at = object;
     let mut in_extensions = false;
     let Some((path, _)) = rest.rsplit_once('/') else { return };
-    for name in path.split('/') {
+    let mut names = path.split('/').peekable();
+    while let Some(name) = names.next() {
         let Some(members) = at.as_object_mut() else { return };
-        let may_be_made = if in_extensions {
-            is_read(name)
-        } else {
-            ["extensions", "pbrMetallicRoughness"].contains(&name)
+        let may_be_made = match (in_extensions, name) {
+            (true, _) => is_read(name),
+            // Not for an extension that cannot be made.
+            (false, "extensions") => names.peek().is_some_and(|name| is_read(name)),
+            (false, _) => name == "pbrMetallicRoughness",
         };
         if !members.contains_key(name) && !may_be_made {
             return;

@@ -154,6 +154,9 @@ pub enum ProjectProblem {
     /// There is no version in it.
     #[error("not a Caustica project: the field \"caustica\" with the version is missing")]
     NotAProject,
+    /// What stands in its place is none.
+    #[error("not a Caustica project: the field \"caustica\" is {0}, which is no version number")]
+    NoVersion(String),
     /// A later version of the program wrote it.
     #[error(
         "written by a newer version of Caustica (format {found}, this program reads up to {SCHEMA_VERSION}); \

@@ -53,7 +53,7 @@ pub(super) fn load(
 ) -> Result<Imported, ImportError> {
     let bytes = read_model_file(path)?;
     let Tidy { text, smooth, materials: used, short_faces, other_elements } =
-        lines::tidy(&String::from_utf8_lossy(&bytes))
+        lines::tidy(&lines::text_of(&bytes))
             .map_err(|(line, reason)| ImportError::new(path, reason).at(format!("line {line}")))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     progress("reading faces", 0.1);
@@ -104,14 +104,25 @@ pub(super) fn load(
         imported.meshes.push(mesh);
     }
     if imported.meshes.is_empty() {
-        let reason = "the file holds no triangle that could be shown";
-        return Err(ImportError::new(path, reason));
+        return Err(nothing(path, &lines::text_of(&bytes), &warnings.list.into_inner()));
     }
     imported.prefab = Prefab::new(file_stem(path), path);
     imported.prefab.set_nodes(parts).map_err(|error| ImportError::new(path, error.to_string()))?;
     imported.warnings = warnings.list.into_inner();
     progress("done", 1.0);
     Ok(imported)
+}
+
+/// Why a file shows nothing.
+fn nothing(path: &Path, text: &str, warnings: &[Warning]) -> ImportError {
+    let reason = "the file holds no triangle that could be shown";
+    if let Some(line) = lines::not_finite(text) {
+        let place = format!("line {line}");
+        return ImportError::new(path, format!("a position is not finite, and {reason}")).at(place);
+    }
+    let said: Vec<&str> = warnings.iter().map(|warning| warning.message.as_str()).collect();
+    let why = if said.is_empty() { "it has no faces".to_owned() } else { said.join("; ") };
+    ImportError::new(path, format!("{reason}: {why}"))
 }
 
 /// The material libraries that a model names, each read once.
@@ -149,7 +160,7 @@ impl Libraries<'_> {
             });
             match text {
                 Ok((bytes, file)) => {
-                    read.materials.extend(mtl::parse(&String::from_utf8_lossy(&bytes), &file, self.warnings));
+                    read.materials.extend(mtl::parse(&lines::text_of(&bytes), &file, self.warnings));
                 }
                 Err(reason) => {
                     let message = format!("{reason}; its materials are left out");

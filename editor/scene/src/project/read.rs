@@ -47,7 +47,9 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ProjectProblem> {
 /// The text of a project file as this version has it.
 pub(super) fn parse(bytes: &[u8]) -> Result<ProjectFile, ProjectProblem> {
     let value: Value = serde_json::from_slice(bytes)?;
-    let found = value.get("caustica").and_then(Value::as_u64).ok_or(ProjectProblem::NotAProject)?;
+    let version = value.get("caustica").ok_or(ProjectProblem::NotAProject)?;
+    let is_none = || ProjectProblem::NoVersion(version.to_string().chars().take(40).collect());
+    let found = version.as_u64().ok_or_else(is_none)?;
     if found > SCHEMA_VERSION {
         return Err(ProjectProblem::Newer { found });
     }

@@ -321,3 +321,36 @@ fn libraries_are_found_by_names_with_blanks_and_in_lists() {
     assert_eq!(imported.warnings.len(), 1);
     assert_eq!(imported.warnings[0].place, "mtllib absent.mtl");
 }
+
+#[test]
+fn line_ends_of_old_macs_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.mtl"), "newmtl a\rKd 0 0 1\rnewmtl b\rKd 1 0 0\r").unwrap();
+    let path = folder.path().join("mac.obj");
+    let obj = "mtllib m.mtl\rv 0 0 0\rv 1 0 0\rv 0 1 0\rusemtl b\rf 1 2 3\r";
+    std::fs::write(&path, obj).unwrap();
+    let imported = imported(&path);
+    assert_eq!((imported.meshes[0].triangle_count(), imported.materials.len()), (1, 2));
+    std::fs::write(&path, obj.replace("v 1 0 0", "v 1 0 x")).unwrap();
+    let error = load(&path, &ImportOptions::default()).unwrap_err();
+    assert_eq!((error.place.as_str(), error.reason.as_str()), ("line 3", "\"x\" is not a number"));
+}
+
+#[test]
+fn a_file_that_shows_nothing_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("nothing.obj");
+    let nothing = "the file holds no triangle that could be shown";
+    let not_finite = format!("a position is not finite, and {nothing}");
+    let flat = "1 triangles without area or with positions that are not finite were removed";
+    for (text, place, reason) in [
+        ("v 0 0 0\nv 1e308 0 0\nv 0 1 0\nf 1 2 3\n", "line 2", not_finite.clone()),
+        ("\nv 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "line 4", not_finite),
+        ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "", format!("{nothing}: {flat}")),
+        ("v 0 0 0\n", "", format!("{nothing}: it has no faces")),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let error = load(&path, &ImportOptions::default()).unwrap_err();
+        assert_eq!((error.place.as_str(), error.reason), (place, reason), "{text:?}");
+    }
+}

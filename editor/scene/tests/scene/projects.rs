@@ -202,6 +202,11 @@ fn other_files_and_newer_versions_are_refused_in_words() {
     assert!(matches!(newer.problem, ProjectProblem::Newer { found: 99 }));
     assert!(newer.to_string().contains("newer version"), "{newer}");
     assert!(matches!(load("{}").problem, ProjectProblem::NotAProject));
+    for version in ["\"2\"", "1.5", "-1", "null"] {
+        let problem = load(&format!("{{\"caustica\": {version}}}"));
+        let words = format!("the field \"caustica\" is {version}, which is no version number");
+        assert!(problem.to_string().contains(&words), "{problem}");
+    }
     for spent in [
         r#"{"caustica": 2, "nextId": 18446744073709551615}"#,
         r#"{"caustica": 2, "nodes": [{"id": 18446744073709551615, "name": ""}]}"#,

@@ -82,13 +82,23 @@ fn parse(bytes: &[u8]) -> Result<Value, Fault> {
         return Err(Fault::new("line 1 column 1", reason));
     }
     let json: Value = serde_json::from_slice(bytes).map_err(|error| {
-        Fault::new(
-            format!("line {} column {}", error.line(), error.column()),
-            format!("not valid JSON: {error}"),
-        )
+        let place = format!("line {} column {}", error.line(), error.column());
+        let reason = error.to_string().replace(&format!(" at {place}"), "");
+        Fault::new(place, format!("not valid JSON: {reason}"))
     })?;
     match json.is_object() {
         true => Ok(json),
         false => Err(Fault::new("line 1 column 1", "the JSON is no object, so it is no glTF")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_of_the_json_names_its_place_once() {
+        let fault = parse(b"{\n1}").err();
+        assert_eq!(fault, Some(Fault::new("line 2 column 1", "not valid JSON: key must be a string")));
     }
 }

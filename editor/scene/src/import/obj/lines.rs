@@ -25,6 +25,22 @@ pub(super) struct Tidy {
 /// A line number, from 1, and what is wrong there.
 pub(super) type LineFault = (usize, String);
 
+/// The text of a file; line ends of old Macs become those of today.
+pub(super) fn text_of(bytes: &[u8]) -> Cow<'_, str> {
+    let text = String::from_utf8_lossy(bytes);
+    if text.contains('\n') { text } else { Cow::Owned(text.replace('\r', "\n")) }
+}
+
+/// The first line with a position that is not finite in single precision.
+pub(super) fn not_finite(text: &str) -> Option<usize> {
+    let is_finite = |word: &str| word.parse().is_ok_and(f32::is_finite);
+    let found = logical_lines(text).find(|(_, line)| {
+        let mut words = words(line);
+        words.next() == Some("v") && !words.all(is_finite)
+    });
+    found.map(|(number, _)| number)
+}
+
 /// Checks and rewrites the lines.
 pub(super) fn tidy(text: &str) -> Result<Tidy, LineFault> {
     let mut writer = Writer { uses: uses(text), ..Writer::default() };

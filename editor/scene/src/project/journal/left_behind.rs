@@ -11,7 +11,7 @@ use super::held::HeldJournal;
 use super::{ENDING, Journal, remove};
 use crate::assets::{Environment, EnvironmentFile, Mesh, ShapeSource};
 use crate::edit::Edit;
-use crate::import::ImportOptions;
+use crate::import::{ImportOptions, plain};
 use crate::project::read::{Loader, parse, read_file};
 use crate::project::unknown::ProjectFile;
 use crate::project::{Fingerprint, Project, ProjectProblem, SCHEMA_VERSION, atomic};
@@ -57,7 +57,7 @@ pub struct RecoveredStep {
 
 /// Why unsaved changes cannot be recovered. Their file stays.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", file.display())]
+#[error("{}", plain(&format!("{}: {problem}", file.display())))]
 pub struct JournalError {
     /// The journal, or the project that it follows.
     pub file: PathBuf,

@@ -32,7 +32,7 @@ demo: setup ## open the demo project, or render out/demo.png where there is no d
 # not to optimise them (GALLIVM_PERF: three to four times faster to compile, half as fast to run).
 test: ## all tests, headless (installs the test tools that are missing)
 	@scripts/setup.sh --test
-	GALLIVM_PERF=nopt cargo test --release --workspace
+	NODE_PATH=$${NODE_PATH:-$(abspath $(TARGET_DIR))/validator/node_modules} GALLIVM_PERF=nopt cargo test --release --workspace
 
 # Of the test editor/scene/tests/mutations; `make mutate CASES=1000000` overrides it.
 CASES ?= 100000

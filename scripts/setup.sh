@@ -50,7 +50,8 @@ trace rays: compiler, libraries of the window and the Vulkan loader,
 finds no device a driver (Mesa). Uses sudo only when not root.
 
   --compiler   only the compiler; builds nothing
-  --test       also what `make test` needs: validation layer, Xvfb, xdotool ...
+  --test       also what `make test` needs: validation layer, Xvfb, xdotool ...;
+               where npm is there, the validator for glTF
   --help       this text
 
 Exit: 0 ready; 1 something is missing that the script cannot install (it says
@@ -273,6 +274,15 @@ build_and_find_device() {
   }
 }
 
+# The Khronos validator, for the test of exported files; where there is no node that test is skipped.
+install_validator() {
+  local folder="${CARGO_TARGET_DIR:-target}/validator"
+  command -v npm >/dev/null && [ ! -d "$folder/node_modules/gltf-validator" ] || return 0
+  say "installing gltf-validator: the rules of Khronos for exported files"
+  timeout 120 npm install --silent --prefix "$folder" gltf-validator >/dev/null 2>&1 ||
+    say "gltf-validator could not be installed; the test that runs it is skipped"
+}
+
 main() {
   local mode=demo
   case ${1:-} in
@@ -306,6 +316,7 @@ main() {
   check_rust
   [ "$mode" != compiler ] || return 0
   build_and_find_device "$mesa"
+  [ "$mode" != test ] || install_validator
   say "ready"
 }
 

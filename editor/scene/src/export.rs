@@ -220,10 +220,10 @@ impl<'a> Writer<'a> {
         self.warn_about_the_rest(&tree, &meshes);
         self.warn_about_clips(&tree, clips.left_out);
 
-        let lists = std::mem::take(&mut self.buffer).finish();
         let mut cameras = nodes.cameras.pool.into_list();
         cameras.extend(sources.spare(|foreign| &foreign.spare_cameras, &mut self.used));
         let mut file = self.top(&tree, &sources, nodes.lights);
+        let lists = std::mem::take(&mut self.buffer).finish();
         self.warn_about_lost(&sources);
         file.put_filled("extensionsUsed", self.used.names());
         for (name, list) in [

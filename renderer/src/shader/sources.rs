@@ -41,6 +41,8 @@ pub struct Source {
 impl ShaderSources {
     /// Reads from `folder`, or from the copy in the binary when it is `None`.
     pub fn new(folder: Option<PathBuf>) -> Self {
+        // Absolute, as the paths are of files that were saved in it.
+        let folder = folder.map(|folder| std::path::absolute(&folder).unwrap_or(folder));
         Self { folder, held: Arc::default() }
     }
 

@@ -2,14 +2,17 @@
 //! written as it is keeps all of its scenes; else there is one, and what others have is left out with a warning.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::Cursor;
 
+use image::{ImageFormat, Rgb32FImage};
 use serde_json::Value;
 
 use super::Writer;
+use super::buffer::Use;
 use super::foreign::Sources;
 use super::json::{self, Object, Put};
 use super::tree::Tree;
-use crate::assets::Environment;
+use crate::assets::{Environment, EnvironmentFile};
 use crate::ids::{NodeId, PrefabId, Target};
 use crate::prefab::SourceScene;
 
@@ -26,7 +29,7 @@ impl Writer<'_> {
         for (place, scene) in prefab.scenes().iter().enumerate() {
             let extras = match place == shown {
                 true => self.environment(tree),
-                false => constant(scene.environment.as_ref()),
+                false => self.surroundings(scene.environment.as_ref()),
             };
             let mut object = Object::new();
             object.put_text("name", &scene.name);
@@ -72,10 +75,30 @@ impl Writer<'_> {
             Environment::Auto => asked.into_iter().next(),
             set => Some(set),
         };
-        let extras = constant(environment);
-        if let Some(Environment::DefaultSky | Environment::File(_)) = environment {
-            self.warn("environment", "only a constant one is written, glTF has no word for others");
+        self.surroundings(environment)
+    }
+
+    /// `extras` for an environment; nothing for none. A map goes into the buffer, as its file is or as EXR.
+    fn surroundings(&mut self, environment: Option<&Environment>) -> Object {
+        let mut said = Object::new();
+        match environment {
+            None | Some(Environment::Auto) => return Object::new(),
+            Some(Environment::Constant(radiance)) => {
+                said.put("constantRadiance", json::numbers(&radiance.to_array()));
+            }
+            Some(Environment::DefaultSky) => said.put("sky", true),
+            Some(Environment::File(file)) => {
+                let Some(bytes) = encoded(file) else {
+                    self.warn("environment", "its map could not be read and is left out");
+                    return Object::new();
+                };
+                said.put("bufferView", self.buffer.view(&bytes, Use::Other));
+                said.put("rotationRad", file.rotation_rad);
+                said.put("scale", file.scale);
+            }
         }
+        let mut extras = Object::new();
+        extras.put("environment", said);
         extras
     }
 
@@ -104,12 +127,16 @@ impl Writer<'_> {
     }
 }
 
-/// `extras` for a constant environment; nothing for others.
-fn constant(environment: Option<&Environment>) -> Object {
-    let (mut extras, mut environment_object) = (Object::new(), Object::new());
-    if let Some(Environment::Constant(radiance)) = environment {
-        environment_object.put("constantRadiance", json::numbers(&radiance.to_array()));
-        extras.put("environment", environment_object);
+/// The bytes of a map: those of its file, where it has one of its own.
+fn encoded(file: &EnvironmentFile) -> Option<Vec<u8>> {
+    let map = file.map.as_ref()?;
+    let own =
+        file.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("hdr") || e.eq_ignore_ascii_case("exr"));
+    if let Some(bytes) = own.then(|| std::fs::read(&file.path).ok()).flatten() {
+        return Some(bytes);
     }
-    extras
+    let image = Rgb32FImage::from_raw(map.width, map.height, map.rgb.as_flattened().to_vec())?;
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, ImageFormat::OpenExr).ok()?;
+    Some(bytes.into_inner())
 }

@@ -20,9 +20,13 @@ const MAX_ALLOC_BYTES: u64 = 8 << 30;
 /// # Errors
 /// When the file cannot be read, is no HDR or EXR image or is too large.
 pub fn load_environment(path: &Path) -> Result<(RadianceMap, Vec<Warning>), ImportError> {
-    let bytes = super::read_model_file(path)?;
+    of_bytes(&super::read_model_file(path)?, path)
+}
+
+/// The same of bytes that lie in a file.
+pub(super) fn of_bytes(bytes: &[u8], path: &Path) -> Result<(RadianceMap, Vec<Warning>), ImportError> {
     let at = Cell::new(0);
-    let image = decode(&bytes, &at)
+    let image = decode(bytes, &at)
         .map_err(|reason| ImportError::new(path, reason).at(format!("byte {}", at.get())))?;
     let (width, height) = image.dimensions();
     let mut repaired = 0_usize;

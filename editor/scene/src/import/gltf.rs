@@ -25,6 +25,7 @@ mod material;
 mod mesh;
 mod node;
 mod skin;
+mod surroundings;
 mod texture;
 
 pub(crate) use check::is_read;
@@ -70,6 +71,7 @@ fn read(
         materials.push(Material { name: "default".to_owned(), ..Material::default() });
     }
     let mut tree = node::read_scenes(&root, &accessors, &meshes)?;
+    let surroundings = surroundings::read(&root, accessors.buffers(), &views, path, &mut tree.scenes)?;
     let (skins, skin_places) = skin::read_all(&root, &accessors, &meshes.list, &mut tree)?;
     let (animations, channels) = animation::read_all(&root, &accessors, &meshes.list, &materials, &mut tree)?;
     let mut foreign = foreign::read(&root, &mut meshes, &mut tree, &skin_places)?;
@@ -91,6 +93,7 @@ fn read(
         .chain(material_warnings)
         .chain(meshes.warnings)
         .chain(tree.warnings)
+        .chain(surroundings)
         .chain(image_warnings);
     let warnings: Vec<Warning> = faults
         .map(|fault| Warning { file: path.to_owned(), place: fault.place, message: fault.reason })

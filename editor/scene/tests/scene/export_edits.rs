@@ -4,8 +4,8 @@ use std::path::Path;
 
 use caustica_scene::import::Warning;
 use caustica_scene::{
-    Camera, Cloud, Document, Edit, Environment, Light, LightKind, Local, Material, MaterialEntry, MaterialId,
-    Node, NodeId, NodeKind, Projection, ShapeSource, Target, Trs, export,
+    Camera, Cloud, Document, Edit, Environment, EnvironmentFile, Light, LightKind, Local, Material,
+    MaterialEntry, MaterialId, Node, NodeId, NodeKind, Projection, ShapeSource, Target, Trs, export,
 };
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
@@ -55,6 +55,41 @@ fn edited(folder: &Path) -> Scene {
     apply(document, Edit::AssignMaterial { target: plate, primitive: 1, material });
     apply(document, Edit::SetEnvironment(Environment::Constant(Vec3::new(0.1, 0.2, 0.3))));
     scene
+}
+
+#[test]
+fn what_surrounds_the_scene_comes_along() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = scene(folder.path());
+    let file = folder.path().join("sky.exr");
+    image::Rgb32FImage::from_fn(4, 2, |x, y| image::Rgb([x as f32 + 0.1, y as f32, 0.3]))
+        .save(&file)
+        .unwrap();
+    let map: std::sync::Arc<_> = caustica_scene::import::load_environment(&file).unwrap().0.into();
+    let environment = EnvironmentFile { path: file, rotation_rad: 0.25, scale: 2.0, map: Some(map.clone()) };
+    scene.document.apply(Edit::SetEnvironment(Environment::File(environment))).unwrap();
+    let mut document = scene.document.clone();
+    // The second time there is no file of its own behind the map.
+    for name in ["one.glb", "two.gltf"] {
+        let (path, done) = exported(&document, folder.path(), name);
+        assert!(done.warnings.is_empty(), "{:?}", done.warnings);
+        let imported = read(&path);
+        assert!(imported.warnings.is_empty(), "{:?}", imported.warnings);
+        document = placed(imported);
+        let Environment::File(again) = document.effective_environment() else { panic!("{name}") };
+        assert_eq!((again.rotation_rad, again.scale), (0.25, 2.0));
+        let again = again.map.unwrap();
+        assert_eq!((again.width, again.height, &again.rgb), (map.width, map.height, &map.rgb), "{name}");
+    }
+    scene.document.apply(Edit::SetEnvironment(Environment::DefaultSky)).unwrap();
+    let (path, done) = exported(&scene.document, folder.path(), "sky.glb");
+    assert!(done.warnings.is_empty(), "{:?}", done.warnings);
+    assert_eq!(placed(read(&path)).effective_environment(), Environment::DefaultSky);
+    let mut json = json_of(&exported(&document, folder.path(), "three.gltf").0);
+    json["scenes"][0]["extras"]["environment"]["bufferView"] = 0.into();
+    std::fs::write(folder.path().join("three.gltf"), json.to_string()).unwrap();
+    let damaged = read(&folder.path().join("three.gltf"));
+    assert!(damaged.warnings.iter().any(|warning| warning.message.contains("map cannot be read")));
 }
 
 #[test]

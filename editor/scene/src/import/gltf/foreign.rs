@@ -10,6 +10,7 @@ use super::check;
 use super::json::{Fault, Item};
 use super::mesh::Meshes;
 use super::node::{Tree, read_camera};
+use super::surroundings::is_ours;
 use crate::foreign::{Foreign, Kept, KeptSkin, Unknown};
 
 /// Extensions that hold indices of nodes, meshes, images, accessors or buffer views.
@@ -109,8 +110,7 @@ pub(super) fn carried<'a>(root: &Item<'a>) -> Result<(Vec<Item<'a>>, Vec<Item<'a
 
 fn of_scene(scene: &Item<'_>) -> Unknown {
     let own = scene.get("extras").and_then(|extras| extras.get("environment"));
-    let is_ours = own.is_some_and(|environment| environment.get("constantRadiance").is_some());
-    unknown(scene, if is_ours { &["environment"] } else { &[] })
+    unknown(scene, if own.as_ref().is_some_and(is_ours) { &["environment"] } else { &[] })
 }
 
 /// What is kept of the lights or cameras that parts carry. `carried`: by part.

@@ -9,7 +9,7 @@ use super::accessor::Accessors;
 use super::foreign::carried;
 use super::json::{Fault, Item, held};
 use super::mesh::{Meshes, read_weights};
-use crate::assets::{Camera, Environment, Light, LightKind, Mesh, Projection};
+use crate::assets::{Camera, Light, LightKind, Mesh, Projection};
 use crate::foreign::LooseMesh;
 use crate::ids::MeshId;
 use crate::prefab::{PartNode, SourceScene};
@@ -99,8 +99,7 @@ impl Walk<'_> {
 
     /// A scene with those of its nodes that were not read yet. `strict`: no node may be in it twice.
     fn scene(&mut self, item: &Item<'_>, strict: bool) -> Result<SourceScene, Fault> {
-        let environment = read_environment(item)?;
-        let mut scene = SourceScene { name: item.name()?, environment, ..SourceScene::default() };
+        let mut scene = SourceScene { name: item.name()?, ..SourceScene::default() };
         let mut seen = BTreeSet::new();
         for node in item.indices("nodes", self.nodes.len(), "node")? {
             let root = match self.part_of(node) {
@@ -157,16 +156,6 @@ fn roots_of(children: &[Vec<usize>]) -> Vec<usize> {
         }
     }
     (0..children.len()).filter(|&node| is_child.get(node) == Some(&false)).collect()
-}
-
-/// `extras.environment.constantRadiance`: the same radiance from everywhere.
-fn read_environment(scene: &Item<'_>) -> Result<Option<Environment>, Fault> {
-    let environment = scene.get("extras").and_then(|e| e.get("environment"));
-    let Some(environment) = environment.filter(|e| e.get("constantRadiance").is_some()) else {
-        return Ok(None);
-    };
-    let radiance = environment.f32s_or("constantRadiance", [0.0; 3])?;
-    Ok(Some(Environment::Constant(Vec3::from(radiance).max(Vec3::ZERO))))
 }
 
 struct Reader<'a> {

@@ -1,0 +1,68 @@
+//! What surrounds the scenes of a file, as this program writes it into `extras.environment` of a scene: glTF has no word for it.
+//! In: JSON and buffers. Out: environments, and a warning for a map that cannot be read.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::accessor::View;
+use super::buffers::Buffers;
+use super::json::{Fault, Item};
+use crate::assets::{Environment, EnvironmentFile};
+use crate::import::environment::of_bytes;
+use crate::prefab::SourceScene;
+
+/// Whether a scene says it in the words of this program.
+pub(super) fn is_ours(environment: &Item<'_>) -> bool {
+    ["constantRadiance", "sky", "bufferView"].iter().any(|word| environment.get(word).is_some())
+}
+
+/// Gives the scenes their environments. `path`: of the file.
+pub(super) fn read(
+    root: &Item<'_>,
+    buffers: &Buffers,
+    views: &[View],
+    path: &Path,
+    scenes: &mut [SourceScene],
+) -> Result<Vec<Fault>, Fault> {
+    let mut warnings = Vec::new();
+    for (item, scene) in root.objects("scenes")?.iter().zip(scenes) {
+        let environment = item.get("extras").and_then(|extras| extras.get("environment"));
+        if let Some(environment) = environment.filter(is_ours) {
+            scene.environment = Some(one(&environment, buffers, views, path, &mut warnings)?);
+        }
+    }
+    Ok(warnings)
+}
+
+fn one(
+    item: &Item<'_>,
+    buffers: &Buffers,
+    views: &[View],
+    path: &Path,
+    warnings: &mut Vec<Fault>,
+) -> Result<Environment, Fault> {
+    if let Some(index) = item.index("bufferView", views.len(), "buffer view")? {
+        let view = views.get(index);
+        let bytes =
+            view.and_then(|view| buffers.bytes(view.buffer).get(view.start..view.start + view.length));
+        let map = match of_bytes(bytes.unwrap_or_default(), path) {
+            Ok((map, repairs)) => {
+                warnings.extend(repairs.into_iter().map(|repair| item.fault(repair.message)));
+                Some(Arc::new(map))
+            }
+            Err(error) => {
+                warnings.push(item.fault(format!("the map cannot be read and is black: {}", error.reason)));
+                None
+            }
+        };
+        let (rotation_rad, scale) = (item.f32_or("rotationRad", 0.0)?, item.f32_or("scale", 1.0)?.max(0.0));
+        return Ok(Environment::File(EnvironmentFile { path: path.to_owned(), rotation_rad, scale, map }));
+    }
+    if item.bool_or("sky", false)? {
+        return Ok(Environment::DefaultSky);
+    }
+    let radiance = item.f32s_or("constantRadiance", [0.0; 3])?;
+    Ok(Environment::Constant(Vec3::from(radiance).max(Vec3::ZERO)))
+}

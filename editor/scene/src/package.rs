@@ -52,6 +52,8 @@ pub struct PrefabPackage {
     pub materials: Vec<(MaterialId, MaterialEntry)>,
     /// Its textures.
     pub textures: Vec<(TextureId, Texture)>,
+    /// Materials that stand by themselves once it takes the place of another reading: edited ones that the source has no more.
+    pub beside: Vec<(MaterialId, MaterialEntry)>,
 }
 
 fn lookup<T: Copy>(ids: &[T], index: u64) -> Option<T> {
@@ -72,6 +74,7 @@ pub(crate) fn package_with_ids(
         meshes: prefab.meshes.iter().copied().zip(meshes).collect(),
         materials: prefab.materials.iter().copied().zip(materials).collect(),
         textures: prefab.textures.iter().copied().zip(textures).collect(),
+        beside: Vec::new(),
         prefab,
     }
 }
@@ -185,15 +188,10 @@ impl Document {
         let stays = |id: &MaterialId| package.prefab.materials.contains(id);
         let gone = old.materials.iter().filter(|id| !stays(id)).filter_map(|&material| {
             let entry = self.material_entry(material).filter(|entry| entry.is_edited())?;
-            let entry = Box::new(MaterialEntry { original: None, ..entry.clone() });
-            Some(Edit::AddMaterial { material, entry })
+            Some((material, MaterialEntry { original: None, ..entry.clone() }))
         });
-        let gone: Vec<Edit> = gone.collect();
-        let replace = Edit::ReplacePrefab(Box::new(package));
-        match gone.is_empty() {
-            true => Ok(replace),
-            false => Ok(Edit::batch(replace.describe(self), std::iter::once(replace).chain(gone).collect())),
-        }
+        package.beside = gone.collect();
+        Ok(Edit::ReplacePrefab(Box::new(package)))
     }
 
     /// Takes a prefab with its assets out as a value; the document keeps it.
@@ -204,6 +202,7 @@ impl Document {
             meshes: pick(&prefab.meshes, |id| self.mesh(id)),
             materials: pick(&prefab.materials, |id| self.material_entry(id)),
             textures: pick(&prefab.textures, |id| self.texture(id)),
+            beside: Vec::new(),
             prefab,
         })
     }

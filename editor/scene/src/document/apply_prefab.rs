@@ -23,7 +23,7 @@ impl Brought {
     fn of(package: &PrefabPackage) -> Self {
         Self {
             meshes: package.meshes.iter().map(|(id, _)| *id).collect(),
-            materials: package.materials.iter().map(|(id, _)| *id).collect(),
+            materials: package.materials.iter().chain(&package.beside).map(|(id, _)| *id).collect(),
             textures: package.textures.iter().map(|(id, _)| *id).collect(),
         }
     }
@@ -88,36 +88,24 @@ impl Document {
 
     pub(super) fn replace_prefab(&mut self, package: PrefabPackage) -> Result<Edit, EditError> {
         let id = package.id;
-        let old = self.package_of(id).ok_or_else(|| EditError::NoAsset(format!("prefab {}", id.0)))?;
+        let mut old = self.package_of(id).ok_or_else(|| EditError::NoAsset(format!("prefab {}", id.0)))?;
         let instances: Vec<NodeId> =
             self.slots.iter().filter(|(_, slot)| slot.node.prefab() == Some(id)).map(|(id, _)| *id).collect();
         for &node in &instances {
             self.report_removed(node);
         }
         let changed = Brought::of(&old).or_else_of(Brought::of(&package));
-        // What was edited while the source did not have it stood alone, and goes back into the package.
-        let alone =
-            package.materials.iter().map(|(id, _)| *id).filter(|id| !old.prefab.materials.contains(id));
-        let alone: Vec<Edit> = alone
-            .filter_map(|material| {
-                let entry = Box::new(self.material_entry(material)?.clone());
-                Some(Edit::AddMaterial { material, entry })
-            })
-            .collect();
+        // What was edited while the source did not have it stood by itself, and goes back into the package.
+        let ids = package.materials.iter().map(|(id, _)| *id);
+        let absorbed = ids.filter(|id| !old.prefab.materials.contains(id));
+        old.beside = absorbed.filter_map(|id| Some((id, self.material_entry(id)?.clone()))).collect();
         self.take_package(&old);
         self.insert_package(package);
         for node in instances {
             self.state_parts(node);
         }
         self.report_users(&changed);
-        let back = Edit::ReplacePrefab(Box::new(old));
-        match alone.is_empty() {
-            true => Ok(back),
-            false => {
-                let label = back.describe(self);
-                Ok(Edit::batch(label, std::iter::once(back).chain(alone).collect()))
-            }
-        }
+        Ok(Edit::ReplacePrefab(Box::new(old)))
     }
 
     /// Marks what uses assets of a prefab without being an instance of it: it may have lost them or have them back.
@@ -154,9 +142,10 @@ impl Document {
             self.changes.removed_meshes.remove(&id);
             self.changes.meshes.insert(id);
         }
-        for (id, entry) in package.materials {
+        for (id, entry) in package.materials.into_iter().chain(package.beside) {
             self.reserve_ids_up_to(id.0);
-            self.surroundings.note_material(None, Some(&entry.value));
+            let before = self.materials.get(&id).map(|before| &before.value);
+            self.surroundings.note_material(before, Some(&entry.value));
             self.materials.insert(id, entry);
             self.changes.removed_materials.remove(&id);
             self.changes.materials.insert(id);

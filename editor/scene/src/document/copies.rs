@@ -125,7 +125,7 @@ fn ids_of(package: &PrefabPackage) -> impl Iterator<Item = u64> {
 }
 
 fn renumbered_package(package: PrefabPackage, renumber: Renumber<'_>) -> PrefabPackage {
-    let PrefabPackage { id, mut prefab, meshes, materials, textures } = package;
+    let PrefabPackage { id, mut prefab, meshes, materials, textures, beside: _ } = package;
     let mesh_id = |id: MeshId| MeshId(renumber(id.0));
     let material_id = |id: MaterialId| MaterialId(renumber(id.0));
     let texture_id = |id: TextureId| TextureId(renumber(id.0));
@@ -144,6 +144,7 @@ fn renumbered_package(package: PrefabPackage, renumber: Renumber<'_>) -> PrefabP
             .map(|(id, entry)| (material_id(id), renumbered_material(entry, renumber)))
             .collect(),
         textures: textures.into_iter().map(|(id, texture)| (texture_id(id), texture)).collect(),
+        beside: Vec::new(),
     }
 }
 

@@ -304,6 +304,7 @@ fn with_files(loader: &mut Loader<'_>, edit: Edit) -> Edit {
             return named;
         }
         let mut package = loader.import(named.clone());
+        package.beside.clone_from(&named.beside);
         package.keep_edits(
             true,
             |id| named.materials.iter().find(|(known, _)| *known == id).map(|(_, entry)| entry),

@@ -61,16 +61,20 @@ pub(crate) struct PackageRecord {
     edited: Vec<MaterialRecord>,
     #[serde(default)]
     moved: Vec<MeshRecord>,
+    /// Materials that stand by themselves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    beside: Vec<MaterialRecord>,
 }
 
 impl From<PrefabPackage> for PackageRecord {
     fn from(package: PrefabPackage) -> Self {
-        let PrefabPackage { id, prefab, meshes, materials, .. } = package;
+        let PrefabPackage { id, prefab, meshes, materials, beside, .. } = package;
         let edited = materials.into_iter().filter(|(_, entry)| entry.is_edited());
         let record = |(id, entry): (MaterialId, MaterialEntry)| MaterialRecord { id, value: entry.value };
         Self {
             missing: prefab.missing,
             edited: edited.map(record).collect(),
+            beside: beside.into_iter().map(record).collect(),
             moved: meshes.iter().filter_map(|(id, mesh)| MeshRecord::of(*id, mesh)).collect(),
             prefab: PrefabRecord::of(id, &prefab, paths::absolute_text(&prefab.source)),
         }
@@ -87,6 +91,10 @@ impl From<PackageRecord> for PrefabPackage {
                 entry.value = value;
             }
         }
+        let beside = record.beside.into_iter();
+        package.beside = beside
+            .map(|MaterialRecord { id, value }| (id, MaterialEntry { value, original: None }))
+            .collect();
         for MeshRecord { id, primitives } in record.moved {
             let place = package.meshes.iter_mut().find(|(known, _)| *known == id);
             if let (Some((_, mesh)), Some((&last, _))) = (place, primitives.last_key_value()) {
@@ -181,6 +189,7 @@ pub(crate) fn placeholder(record: &PrefabRecord, source: PathBuf) -> PrefabPacka
         meshes: record.meshes.iter().map(|&id| (id, missing_mesh(id))).collect(),
         materials: record.materials.iter().map(|&id| (id, material(id.0))).collect(),
         textures: record.textures.iter().map(|&id| (id, placeholder_texture(named(id.0)))).collect(),
+        beside: Vec::new(),
         prefab,
     }
 }

@@ -25,7 +25,7 @@ pub use environment::load_environment;
 pub(crate) use error::plain;
 pub use error::{ImportError, Warning};
 pub use shapes::load_shapes;
-pub(crate) use uri::{is_address, leads_out};
+pub(crate) use uri::{Location, is_address, leads_out, resolve};
 
 /// What an import may be told.
 #[derive(Clone, Debug)]

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::json::{Object, Put};
 use super::{ExportError, ExportFormat};
+use crate::import::{Location, resolve};
 use crate::project::atomic;
 
 /// A `.bin` that is there is replaced only where this program has written it with the `.gltf` of that name, and no source of the
@@ -24,7 +25,8 @@ pub(super) fn refuse_foreign_bin<'a>(
     if !is_own(path, &beside) {
         return refuse("is there already and may belong to another file");
     }
-    let mut readers = sources.filter(|source| buffers_of(source).contains(&beside.canonicalize().ok()));
+    let real = beside.canonicalize().unwrap_or(beside);
+    let mut readers = sources.filter(|source| buffers_of(source).contains(&real));
     match readers.next() {
         Some(source) => refuse(&format!("is read by {}, a source of this scene", source.display())),
         None => Ok(()),
@@ -50,10 +52,13 @@ fn is_own(path: &Path, beside: &Path) -> bool {
 }
 
 /// The files that a `.gltf` has its buffers in, links followed.
-fn buffers_of(source: &Path) -> Vec<Option<PathBuf>> {
+fn buffers_of(source: &Path) -> Vec<PathBuf> {
     let (Some(json), Some(folder)) = (json_of(source), source.parent()) else { return Vec::new() };
-    let decoded = |uri: &str| percent_encoding::percent_decode_str(uri).decode_utf8_lossy().into_owned();
-    uris_of(&json).into_iter().map(|uri| folder.join(decoded(uri)).canonicalize().ok()).collect()
+    let file = |uri: &&str| match resolve(uri, folder).ok()? {
+        Location::File(path) => path.canonicalize().ok(),
+        Location::Data(_) => None,
+    };
+    uris_of(&json).iter().filter(|uri| !uri.starts_with("data:")).filter_map(file).collect()
 }
 
 /// Writes the file and returns every path that was written.

@@ -7,7 +7,7 @@ use percent_encoding::percent_decode_str;
 
 /// Where the bytes of a URI are.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Location {
+pub(crate) enum Location {
     /// In the URI itself.
     Data(Vec<u8>),
     /// In a file.
@@ -15,7 +15,7 @@ pub(super) enum Location {
 }
 
 /// Finds out where the bytes of a URI are; `folder` is that of the model.
-pub(super) fn resolve(uri: &str, folder: &Path) -> Result<Location, String> {
+pub(crate) fn resolve(uri: &str, folder: &Path) -> Result<Location, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         return decode_data(data).map(Location::Data);
     }

@@ -22,7 +22,7 @@ pub(super) struct ProjectFile {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Unknown {
     top: Fields,
-    elements: BTreeMap<(String, u64), Fields>,
+    elements: BTreeMap<(&'static str, u64), Fields>,
 }
 
 type Fields = Vec<(String, Extra)>;
@@ -51,7 +51,7 @@ impl ProjectFile {
             for (of_file, known) in of_file.iter().zip(known) {
                 let fields = missing_in(known, of_file);
                 if let (Some(id), false) = (known.get("id").and_then(Value::as_u64), fields.is_empty()) {
-                    unknown.elements.insert((list.to_owned(), id), fields);
+                    unknown.elements.insert((list, id), fields);
                 }
             }
         }
@@ -114,8 +114,7 @@ impl Unknown {
     /// Takes over what belongs to elements that have another id now; what `id` does not name is left out.
     pub fn copy_elements(&mut self, from: &Self, id: impl Fn(u64) -> Option<u64>) {
         let copies = from.elements.iter();
-        let copies =
-            copies.filter_map(|((list, old), fields)| Some(((list.clone(), id(*old)?), fields.clone())));
+        let copies = copies.filter_map(|((list, old), fields)| Some(((*list, id(*old)?), fields.clone())));
         self.elements.extend(copies);
     }
 
@@ -125,7 +124,7 @@ impl Unknown {
             let elements = project.get_mut(list).and_then(Value::as_array_mut);
             for element in elements.into_iter().flatten() {
                 let id = element.get("id").and_then(Value::as_u64).unwrap_or_default();
-                if let Some(fields) = self.elements.get(&(list.to_owned(), id)) {
+                if let Some(fields) = self.elements.get(&(list, id)) {
                     lay_over(element, fields);
                 }
             }

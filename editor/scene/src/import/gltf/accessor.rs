@@ -121,6 +121,13 @@ pub(super) struct View {
     stride: Option<usize>,
 }
 
+impl View {
+    /// Its bytes.
+    pub fn bytes(self, buffers: &Buffers) -> Option<&[u8]> {
+        buffers.bytes(self.buffer).get(self.start..self.start + self.length)
+    }
+}
+
 /// Reads and checks the buffer views; those that are compressed become buffers of their own.
 pub(super) fn views(root: &Item<'_>, buffers: &mut Buffers, counts: &Counts) -> Result<Vec<View>, Fault> {
     let items = root.objects("bufferViews")?;

@@ -44,9 +44,7 @@ fn one(
     warnings: &mut Vec<Fault>,
 ) -> Result<Environment, Fault> {
     if let Some(index) = item.index("bufferView", views.len(), "buffer view")? {
-        let view = views.get(index);
-        let bytes =
-            view.and_then(|view| buffers.bytes(view.buffer).get(view.start..view.start + view.length));
+        let bytes = views.get(index).and_then(|view| view.bytes(buffers));
         let map = match of_bytes(bytes.unwrap_or_default(), path) {
             Ok((map, repairs)) => {
                 warnings.extend(repairs.into_iter().map(|repair| item.fault(repair.message)));

@@ -211,9 +211,7 @@ fn image_name(image: Option<&Item<'_>>) -> Result<String, Fault> {
 fn encoded(image: &Item<'_>, buffers: &Buffers, views: &[View], folder: &Path) -> Result<Vec<u8>, String> {
     let in_words = |fault: Fault| fault.reason;
     if let Some(index) = image.index("bufferView", views.len(), "buffer view").map_err(in_words)? {
-        let bytes = views
-            .get(index)
-            .and_then(|view| buffers.bytes(view.buffer).get(view.start..view.start + view.length));
+        let bytes = views.get(index).and_then(|view| view.bytes(buffers));
         return bytes.map(<[u8]>::to_vec).ok_or_else(|| format!("there is no buffer view {index}"));
     }
     match image.text("uri").map_err(in_words)? {

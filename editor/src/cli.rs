@@ -172,7 +172,11 @@ pub fn run() -> ExitCode {
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
-        ExitCode::from(exit_code_of(&error))
+        match exit_code_of(&error) {
+            // A driver whose device does not answer may hold the process at its end.
+            EXIT_DEVICE => end(EXIT_DEVICE),
+            code => ExitCode::from(code),
+        }
     })
 }
 

@@ -8,6 +8,8 @@ use std::time::Duration;
 
 use caustica_renderer::gpu::Device;
 
+/// So long whoever gave the device up may take to see to the rest: the driver may hold it.
+const SEEN_TO_WITHIN: Duration = Duration::from_secs(3);
 /// So long the end of a process may take whose driver does not answer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
@@ -56,10 +58,14 @@ fn watch(
     let [soon, late] = [device.suspect_after_s(), device.hung_after_s()].map(Duration::from_secs);
     let pause = (soon / 8).clamp(Duration::from_millis(50), Duration::from_secs(1));
     // Counted in looks, not by the clock: a process that was stopped meanwhile has not waited.
-    let (mut stands_at, mut stood) = (None, Duration::ZERO);
+    let (mut stands_at, mut stood, mut given_up) = (None, Duration::ZERO, Duration::ZERO);
     while let Err(RecvTimeoutError::Timeout) = stopped.recv_timeout(pause) {
         if device.is_given_up() {
-            // Whoever did that sees to the rest.
+            given_up += pause;
+            if given_up >= SEEN_TO_WITHIN {
+                hung(late);
+                return;
+            }
             continue;
         }
         // A lost device is noticed by the next frame, unless that never comes.
@@ -69,6 +75,7 @@ fn watch(
         if stood >= late || stood >= soon && is_suspect(stood) {
             device.give_up();
             hung(stood);
+            return;
         }
     }
 }

@@ -403,15 +403,28 @@ impl Session {
     }
 
     /// Puts what was loaded in the place of a prefab's source, as one undo step. Instances keep their overrides.
+    /// Returns how many edited materials the new source has no more; they stay in the project, and the log names them.
     ///
     /// # Errors
     /// When it is no model, or does not fit on the device; the document stays as it was.
-    pub fn replace_source(&mut self, prefab: PrefabId, loaded: Loaded) -> anyhow::Result<()> {
+    pub fn replace_source(&mut self, prefab: PrefabId, loaded: Loaded) -> anyhow::Result<usize> {
         let Loaded::Model(imported) = loaded else {
             anyhow::bail!("only a model (.gltf, .glb, .obj) can be the source of an instance")
         };
         let edit = Arc::make_mut(&mut self.scene.document).reload_edit(prefab, *imported)?;
-        self.push_with_room(edit)
+        let lost = match &edit {
+            Edit::ReplacePrefab(package) => {
+                package.beside.iter().map(|(_, entry)| entry.value.name.clone()).collect()
+            }
+            _ => Vec::new(),
+        };
+        self.push_with_room(edit)?;
+        for name in &lost {
+            tracing::warn!(
+                "the edited material \"{name}\" is not in the new source; it stays in the project, unused"
+            );
+        }
+        Ok(lost.len())
     }
 
     /// Saves the project, with camera and settings of the view.

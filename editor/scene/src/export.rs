@@ -24,6 +24,7 @@ mod node;
 mod pointer;
 mod scene;
 mod shapes;
+mod shear;
 mod texture;
 mod tree;
 
@@ -308,7 +309,6 @@ impl<'a> Writer<'a> {
         meshes: &BTreeMap<MeshKey, usize>,
         skins: &BTreeMap<(NodeId, u32), usize>,
     ) -> Nodes {
-        let moving = animation::moving(self.document, tree);
         let mut writer = NodeWriter {
             document: self.document,
             sources,
@@ -316,7 +316,7 @@ impl<'a> Writer<'a> {
             used: &mut self.used,
             meshes,
             skins,
-            moving: &moving,
+            moving: &tree.moving,
             lights: Carried::default(),
             cameras: Carried::default(),
             warnings: Vec::new(),

@@ -20,6 +20,7 @@ mod migrate;
 mod paths;
 mod read;
 mod record;
+mod sound;
 mod unknown;
 mod write;
 

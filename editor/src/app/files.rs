@@ -191,9 +191,9 @@ impl Editor {
 
     fn replace_source(&mut self, prefab: PrefabId, path: &Path, loaded: Loaded) -> anyhow::Result<()> {
         let warnings = warning_count(&loaded);
-        self.session.replace_source(prefab, loaded)?;
+        let lost = self.session.replace_source(prefab, loaded)?;
         self.session.end_gesture();
-        self.tell(format!("The source is {} now", short(path)), warnings);
+        self.tell(format!("The source is {} now", short(path)), warnings + lost);
         Ok(())
     }
 

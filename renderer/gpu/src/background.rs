@@ -57,6 +57,8 @@ struct Slot {
     queries: Option<(vk::QueryPool, u32)>,
     asked: u32,
     value: u64,
+    /// The value of the frames that it waits for.
+    frames: u64,
     since: Instant,
 }
 
@@ -94,14 +96,14 @@ impl Background {
         };
         let result = record(&self.device, &mut slot, work).and_then(|()| send(&self.device, slot.command));
         match result {
-            Ok(value) => {
-                (slot.value, slot.since) = (value, Instant::now());
+            Ok((value, frames)) => {
+                (slot.value, slot.frames, slot.since) = (value, frames, Instant::now());
                 self.running.push(slot);
                 Ok(Ticket(value))
             }
             Err(error) => {
                 self.idle.push(slot);
-                Err(name_the_work(error))
+                Err(self.name_the_work(error, None))
             }
         }
     }
@@ -112,14 +114,15 @@ impl Background {
     /// # Errors
     /// [`GpuError::DeviceLost`]; [`GpuError::Timeout`] when it has run for so long that the device counts as hung.
     pub fn finished(&mut self, ticket: Ticket) -> Result<Option<Vec<u64>>> {
-        if self.device.background_completed().map_err(name_the_work)? >= ticket.0 {
+        let completed = self.device.background_completed();
+        if completed.map_err(|error| self.name_the_work(error, Some(ticket)))? >= ticket.0 {
             return self.take(ticket).map(Some);
         }
         let seconds = self.device.hung_after_s();
         let hung = |slot: &Slot| slot.value == ticket.0 && slot.since.elapsed().as_secs() >= seconds;
         if self.running.iter().any(hung) {
             self.device.give_up();
-            return Err(timeout(seconds));
+            return Err(self.name_the_work(self.device.overdue(seconds), Some(ticket)));
         }
         Ok(None)
     }
@@ -130,9 +133,33 @@ impl Background {
     /// [`GpuError::DeviceLost`] or [`GpuError::Timeout`].
     pub fn wait(&mut self, ticket: Ticket) -> Result<Vec<u64>> {
         let timeline = self.device.background.semaphore;
-        self.device.wait_on(timeline, ticket.0, self.device.hung_after_s()).map_err(name_the_work)?;
-        self.device.background_completed().map_err(name_the_work)?;
+        let waited = self.device.wait_on(timeline, ticket.0, self.device.hung_after_s());
+        let completed = waited.and_then(|()| self.device.background_completed());
+        completed.map_err(|error| self.name_the_work(error, Some(ticket)))?;
         self.take(ticket)
+    }
+
+    /// Says in an error about a lost or hung device which pass of a frame the work waits for, or else that it was this work.
+    fn name_the_work(&self, error: GpuError, ticket: Option<Ticket>) -> GpuError {
+        let slot = self.running.iter().find(|slot| Some(Ticket(slot.value)) == ticket);
+        // A device that is lost tells no value.
+        let waits = slot.is_some_and(|slot| self.device.completed().is_ok_and(|value| value < slot.frames));
+        let own = || (String::from("unknown"), String::from(LABEL));
+        match error {
+            GpuError::Timeout { .. } if waits => self.device.name_the_pass(error),
+            GpuError::Timeout { seconds, .. } => {
+                let (last_pass, next_pass) = own();
+                GpuError::Timeout { seconds, last_pass, next_pass }
+            }
+            GpuError::DeviceLost { .. } => {
+                let named = self.device.name_the_pass(error);
+                let is_known =
+                    named.unfinished_pass().is_some_and(|pass| !["none", "unknown"].contains(&pass));
+                let (last_pass, next_pass) = own();
+                if is_known { named } else { GpuError::DeviceLost { last_pass, next_pass } }
+            }
+            other => other,
+        }
     }
 
     /// Takes the results of a finished submission.
@@ -257,8 +284,8 @@ fn full_barrier(device: &Device, command: vk::CommandBuffer) {
     }
 }
 
-/// Submits after the frames so far; returns the value that the background's timeline will reach.
-fn send(device: &Device, command: vk::CommandBuffer) -> Result<u64> {
+/// Submits after the frames so far; returns the value that the background's timeline will reach, and that of the frames.
+fn send(device: &Device, command: vk::CommandBuffer) -> Result<(u64, u64)> {
     let at = |semaphore, value| {
         vk::SemaphoreSubmitInfo::default()
             .semaphore(semaphore)
@@ -268,7 +295,8 @@ fn send(device: &Device, command: vk::CommandBuffer) -> Result<u64> {
     // The value is chosen and submitted under the lock, so that the timeline only ever rises.
     let queue = device.background_queue().lock().map_err(|_| lost())?;
     let value = device.background.submitted.load(Ordering::Acquire) + 1;
-    let waits = [at(device.timeline, device.submitted.load(Ordering::Acquire))];
+    let frames = device.submitted.load(Ordering::Acquire);
+    let waits = [at(device.timeline, frames)];
     let signals = [at(device.background.semaphore, value)];
     let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(command)];
     let info = [vk::SubmitInfo2::default()
@@ -278,7 +306,7 @@ fn send(device: &Device, command: vk::CommandBuffer) -> Result<u64> {
     // SAFETY: the queue is locked, the command buffer is complete, the semaphores live as long as the device.
     unsafe { device.raw.queue_submit2(*queue, &info, vk::Fence::null()) }.during("vkQueueSubmit2")?;
     device.background.submitted.store(value, Ordering::Release);
-    Ok(value)
+    Ok((value, frames))
 }
 
 /// Makes room for `count` queries and resets them.
@@ -317,9 +345,15 @@ fn create_slot(device: &Arc<Device>) -> Result<Slot> {
     let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
     // SAFETY: the pool is alive; the buffer dies with it.
     match unsafe { device.raw.allocate_command_buffers(&info) }.during("vkAllocateCommandBuffers") {
-        Ok(commands) => {
-            Ok(Slot { pool, command: commands[0], queries: None, asked: 0, value: 0, since: Instant::now() })
-        }
+        Ok(commands) => Ok(Slot {
+            pool,
+            command: commands[0],
+            queries: None,
+            asked: 0,
+            value: 0,
+            frames: 0,
+            since: Instant::now(),
+        }),
         Err(error) => {
             device.retire(Garbage::CommandPool(pool));
             Err(error)
@@ -327,19 +361,6 @@ fn create_slot(device: &Arc<Device>) -> Result<Slot> {
     }
 }
 
-/// Says in an error about a lost or hung device that the background saw it.
-fn name_the_work(error: GpuError) -> GpuError {
-    match error {
-        GpuError::DeviceLost { .. } => lost(),
-        GpuError::Timeout { seconds, .. } => timeout(seconds),
-        other => other,
-    }
-}
-
 fn lost() -> GpuError {
     GpuError::DeviceLost { last_pass: String::from("unknown"), next_pass: String::from(LABEL) }
-}
-
-fn timeout(seconds: u64) -> GpuError {
-    GpuError::Timeout { seconds, last_pass: String::from("unknown"), next_pass: String::from(LABEL) }
 }

@@ -66,16 +66,17 @@ fn write_skin(object: &mut Object, skin: &Skin, node: NodeId, tree: &Tree, buffe
     object.put("joints", skin.joints.iter().filter_map(place).collect::<Vec<_>>());
 }
 
-/// Parts whose transforms clips move.
-pub(super) fn moving(document: &Document, tree: &Tree) -> BTreeSet<Target> {
-    let mut moving = BTreeSet::new();
-    for &(node, prefab) in &tree.instances {
-        let clips = document.prefab(prefab).map_or(&[][..], |prefab| &prefab.animations);
-        let channels = clips.iter().flat_map(|clip| &clip.channels);
-        let transforms = channels.filter(|channel| channel.path.is_transform());
-        moving.extend(transforms.map(|channel| Target::part(node, channel.part)));
-    }
-    moving
+/// Parts of an instance whose transforms clips move.
+pub(super) fn moved_parts(
+    document: &Document,
+    node: NodeId,
+    prefab: PrefabId,
+) -> impl Iterator<Item = Target> {
+    let clips = document.prefab(prefab).map_or(&[][..], |prefab| &prefab.animations);
+    let channels = clips.iter().flat_map(|clip| &clip.channels);
+    channels
+        .filter(|channel| channel.path.is_transform())
+        .map(move |channel| Target::part(node, channel.part))
 }
 
 /// The clips of the file.

@@ -9,7 +9,8 @@ use super::buffer::{Buffer, Use};
 use super::foreign::Sources;
 use super::json::{Extensions, Object, Pool, Put, number, numbers};
 use super::mesh::MeshKey;
-use super::tree::{Entry, Stands, Tree, single_precision};
+use super::shear;
+use super::tree::{Entry, Stands, Tree, local_of, single_precision};
 use crate::assets::{Camera, Light, LightKind, Projection};
 use crate::document::Document;
 use crate::ids::{NodeId, PrefabId, Target};
@@ -59,11 +60,14 @@ impl NodeWriter<'_> {
         match entry.stands {
             Stands::For(target) => self.put_target(&mut node, target, entry),
             Stands::ForPrimitive(target, primitive) => {
-                let mesh = self.document.mesh_of(target).and_then(|id| self.document.mesh(id));
-                let placed = mesh.and_then(|mesh| mesh.primitives.get(primitive as usize));
-                let local = placed.map_or(DAffine3::IDENTITY, |placed| placed.mesh_from_primitive);
-                put_local(&mut node, &Local::from_affine(local));
+                self.put_place(&mut node, target, Some(primitive));
                 self.put_mesh(&mut node, entry, target);
+            }
+            Stands::Around(target, primitive) => {
+                node.put("name", format!("{} (shear)", self.document.display_name(target)));
+                if let Some([outer, _]) = shear::two_nodes(&local_of(self.document, target, primitive)) {
+                    put_local(&mut node, &outer.into());
+                }
             }
         }
         node.put_filled("children", entry.children.clone());
@@ -72,7 +76,7 @@ impl NodeWriter<'_> {
 
     fn put_target(&mut self, node: &mut Object, target: Target, entry: &Entry) {
         node.put_text("name", self.document.name(target).unwrap_or_default());
-        self.put_place(node, target);
+        self.put_place(node, target, None);
         self.put_mesh(node, entry, target);
         if let Some(camera) = self.document.camera_of(target) {
             let place = self.carried(target, camera_of(&camera), false);
@@ -129,21 +133,19 @@ impl NodeWriter<'_> {
         place
     }
 
-    fn put_place(&mut self, node: &mut Object, target: Target) {
-        let local = self.document.local(target).unwrap_or_default();
-        match local {
-            Local::Matrix(_) if self.moving.contains(&target) => {
+    fn put_place(&mut self, node: &mut Object, target: Target, primitive: Option<u32>) {
+        let local = local_of(self.document, target, primitive);
+        let two = shear::two_nodes(&local);
+        if primitive.is_none() && self.moving.contains(&target) {
+            if two.is_some() {
                 self.warn(target, "a clip moves it, so that the shear of its matrix is left out");
-                put_local(node, &local.nearest_trs().into());
             }
-            Local::Matrix(_) => {
-                self.warn(
-                    target,
-                    "its matrix has shear, which glTF does not allow: other programs may drop that",
-                );
-                put_local(node, &local);
-            }
-            Local::Trs(_) => put_local(node, &local),
+            put_local(node, &local.nearest_trs().into());
+        } else if let Some([_, inner]) = two {
+            self.warn(target, "its matrix has shear, which no node of glTF can hold: it becomes two nodes");
+            put_local(node, &inner.into());
+        } else {
+            put_local(node, &local);
         }
     }
 

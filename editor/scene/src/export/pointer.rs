@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::foreign::Sources;
 use super::json::{Extensions, Object, Put};
 use super::node::Carried;
-use super::tree::{Stands, Tree};
+use super::tree::{Entry, Stands, Tree};
 use crate::animation::{Channel, ChannelPath};
 use crate::assets::{Camera, Light, Material};
 use crate::foreign::{KeptChannel, Pointed};
@@ -71,12 +71,16 @@ impl Places<'_> {
             return vec![own];
         }
         let children = self.tree.entries.get(own).map_or(&[][..], |entry| &entry.children);
+        let below = children.iter().flat_map(|child| match self.tree.entries.get(*child) {
+            Some(Entry { stands: Stands::Around(_, Some(_)), children, .. }) => children.as_slice(),
+            _ => std::slice::from_ref(child),
+        });
         let has_weights = |place: &usize| {
             let entry = self.tree.entries.get(*place);
             let is_its = |stands| *place == own || matches!(stands, Stands::ForPrimitive(..));
             entry.is_some_and(|entry| is_its(entry.stands) && entry.mesh.is_some())
         };
-        [own].iter().chain(children).copied().filter(has_weights).collect()
+        [own].iter().chain(below).copied().filter(has_weights).collect()
     }
 
     /// The targets of a channel that is not played, in all instances of its source.

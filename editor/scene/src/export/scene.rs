@@ -33,8 +33,8 @@ impl Writer<'_> {
             };
             let mut object = Object::new();
             object.put_text("name", &scene.name);
-            let roots = scene.roots.iter().filter_map(|&root| tree.places.get(&Target::part(node, root)));
-            object.put_filled("nodes", roots.copied().collect::<Vec<_>>());
+            let roots = scene.roots.iter().filter_map(|&root| tree.top_of(Target::part(node, root)));
+            object.put_filled("nodes", roots.collect::<Vec<_>>());
             let unknown = prefab.foreign.scenes.get(place).map(|unknown| (id, unknown));
             sources.put(&mut object, unknown, extras, &mut self.used);
             list.push(Value::Object(object));

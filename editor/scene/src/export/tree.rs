@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DAffine3, DQuat, Quat};
 
+use super::animation::moved_parts;
 use super::mesh::{MeshKey, Meshes};
+use super::shear;
 use crate::document::Document;
 use crate::ids::{MeshId, NodeId, PrefabId, Target};
 use crate::import::gltf::unit_rotation;
@@ -23,6 +25,16 @@ pub(super) enum Stands {
     For(Target),
     /// One primitive of its mesh that was moved inside the mesh, for which glTF has no word.
     ForPrimitive(Target, u32),
+    /// Half of the transform, with shear, of the node or primitive that is its only child.
+    Around(Target, Option<u32>),
+}
+
+impl Stands {
+    fn target(self) -> Target {
+        match self {
+            Self::For(target) | Self::ForPrimitive(target, _) | Self::Around(target, _) => target,
+        }
+    }
 }
 
 /// One node of the file.
@@ -41,6 +53,10 @@ pub(super) struct Tree {
     pub roots: Vec<usize>,
     /// Places of nodes and parts.
     pub places: BTreeMap<Target, usize>,
+    /// Places of the nodes around those that have shear.
+    around: BTreeMap<Target, usize>,
+    /// Parts whose transforms clips move: each is one node with translation, rotation and scale.
+    pub moving: BTreeSet<Target>,
     /// The only root, when it places a file as it is: its parts are the roots, those that are not shown too.
     pub whole: Option<(NodeId, PrefabId)>,
     /// Instances of prefabs in order.
@@ -52,7 +68,7 @@ impl Tree {
         let mut tree = Self { whole: whole_file(document), ..Self::default() };
         let tops: Vec<Target> = match tree.whole {
             Some((node, prefab)) => {
-                tree.instances.push((node, prefab));
+                tree.add_instance(document, node, prefab);
                 let roots = document.prefab(prefab).into_iter().flat_map(|prefab| prefab.children(None));
                 let roots = roots.map(|part| Target::part(node, part));
                 let (absent, present): (Vec<_>, Vec<_>) = roots.partition(|root| document.is_absent(*root));
@@ -62,31 +78,65 @@ impl Tree {
         };
         let mut stack: Vec<(Stands, Option<usize>)> =
             tops.into_iter().rev().map(|target| (Stands::For(target), None)).collect();
-        while let Some((stands, parent)) = stack.pop() {
-            let place = tree.entries.len();
-            match (parent, stands) {
-                (Some(parent), _) => {
-                    tree.entries.get_mut(parent).into_iter().for_each(|entry| entry.children.push(place));
-                }
-                (None, Stands::For(target)) if document.is_absent(target) => {}
-                (None, _) => tree.roots.push(place),
+        while let Some((stands, mut parent)) = stack.pop() {
+            if let Stands::For(target @ Target { part: None, .. }) = stands
+                && let Some(prefab) = document.prefab_of(target.node)
+            {
+                tree.add_instance(document, target.node, prefab);
             }
-            let mut entry = Entry { stands, children: Vec::new(), mesh: None, instances: Vec::new() };
+            if let Some(around) = tree.around(document, stands) {
+                parent = Some(tree.push(document, around, parent));
+            }
+            let place = tree.push(document, stands, parent);
+            let Some(entry) = tree.entries.get_mut(place) else { continue };
             match stands {
                 Stands::For(target) => {
-                    tree.places.insert(target, place);
-                    if let (None, Some(prefab)) = (target.part, document.prefab_of(target.node)) {
-                        tree.instances.push((target.node, prefab));
-                    }
-                    stack.extend(below(document, meshes, target, &mut entry).map(|s| (s, Some(place))));
+                    stack.extend(below(document, meshes, target, entry).map(|s| (s, Some(place))));
                 }
                 Stands::ForPrimitive(target, primitive) => {
                     entry.mesh = key(document, meshes, target, false, |p| p == primitive);
                 }
+                Stands::Around(..) => {}
             }
-            tree.entries.push(entry);
         }
         tree
+    }
+
+    fn add_instance(&mut self, document: &Document, node: NodeId, prefab: PrefabId) {
+        self.instances.push((node, prefab));
+        self.moving.extend(moved_parts(document, node, prefab));
+    }
+
+    /// Adds a node without content; returns its place.
+    fn push(&mut self, document: &Document, stands: Stands, parent: Option<usize>) -> usize {
+        let place = self.entries.len();
+        match (parent.and_then(|parent| self.entries.get_mut(parent)), stands.target()) {
+            (Some(parent), _) => parent.children.push(place),
+            (None, target) if document.is_absent(target) => {}
+            (None, _) => self.roots.push(place),
+        }
+        match stands {
+            Stands::For(target) => _ = self.places.insert(target, place),
+            Stands::Around(target, None) => _ = self.around.insert(target, place),
+            Stands::ForPrimitive(..) | Stands::Around(..) => {}
+        }
+        self.entries.push(Entry { stands, children: Vec::new(), mesh: None, instances: Vec::new() });
+        place
+    }
+
+    /// What has to stand around something with shear.
+    fn around(&self, document: &Document, stands: Stands) -> Option<Stands> {
+        let (target, primitive) = match stands {
+            Stands::For(target) if !self.moving.contains(&target) => (target, None),
+            Stands::ForPrimitive(target, primitive) => (target, Some(primitive)),
+            Stands::For(_) | Stands::Around(..) => return None,
+        };
+        shear::two_nodes(&local_of(document, target, primitive)).map(|_| Stands::Around(target, primitive))
+    }
+
+    /// The place of the outermost node that stands for a target.
+    pub fn top_of(&self, target: Target) -> Option<usize> {
+        self.around.get(&target).or_else(|| self.places.get(&target)).copied()
     }
 
     /// The prefab of an instance.
@@ -99,6 +149,14 @@ impl Tree {
         let mut seen = BTreeSet::new();
         self.instances.iter().map(|(_, prefab)| *prefab).filter(|prefab| seen.insert(*prefab)).collect()
     }
+}
+
+/// The transform of a node or part, or of a primitive in its mesh.
+pub(super) fn local_of(document: &Document, target: Target, primitive: Option<u32>) -> Local {
+    let Some(primitive) = primitive else { return document.local(target).unwrap_or_default() };
+    let mesh = document.mesh_of(target).and_then(|id| document.mesh(id));
+    let placed = mesh.and_then(|mesh| mesh.primitives.get(primitive as usize));
+    placed.map_or_else(Local::default, |placed| Local::from_affine(placed.mesh_from_primitive))
 }
 
 /// The only root, when it places a file as it is: then its parts are the roots, and a model that is opened and exported

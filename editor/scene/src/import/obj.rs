@@ -52,7 +52,7 @@ pub(super) fn load(
     progress: &dyn Fn(&str, f32),
 ) -> Result<Imported, ImportError> {
     let bytes = read_model_file(path)?;
-    let Tidy { text, smooth, materials: used, short_faces, other_elements } =
+    let Tidy { text, smooth, materials: used, short_faces, other_elements, calls } =
         lines::tidy(&lines::text_of(&bytes))
             .map_err(|(line, reason)| ImportError::new(path, reason).at(format!("line {line}")))?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -61,6 +61,7 @@ pub(super) fn load(
     for (count, what) in [
         (short_faces, "faces of fewer than three corners"),
         (other_elements, "points, lines, curves or surfaces"),
+        (calls, "calls of other files or programs"),
     ] {
         if count > 0 {
             warnings.add(path, "", format!("{count} {what} were left out"));

@@ -56,10 +56,12 @@ pub(super) fn resolve(project: &Path, text: &str) -> Result<PathBuf, Refusal> {
             "\"{text}\" names another machine or an address; only files are read"
         )));
     }
+    if is_foreign(text) {
+        return Err(Refusal::Never(format!("\"{text}\" names a drive, which this machine does not have")));
+    }
     let folder = folder_of(project);
     let path = from_relative(project, text);
-    let drive = text.as_bytes().get(1) == Some(&b':');
-    if drive || !path.starts_with(&folder) || leads_out(&path, &folder) {
+    if !path.starts_with(&folder) || leads_out(&path, &folder) {
         return Err(Refusal::Outside(path));
     }
     Ok(path)
@@ -140,9 +142,7 @@ mod tests {
         ] {
             assert_eq!(resolve(project, text), expected, "{text}");
         }
-        for text in
-            ["../x.glb", "c/../../x.glb", "/etc/passwd", "/a/bc/x.glb", "C:/x.glb", "c:x.glb", "C:\\x.glb"]
-        {
+        for text in ["../x.glb", "c/../../x.glb", "/etc/passwd", "/a/bc/x.glb"] {
             assert!(matches!(resolve(project, text), Err(Refusal::Outside(_))), "{text}");
         }
         for text in [
@@ -155,6 +155,10 @@ mod tests {
             "smb:x",
         ] {
             assert!(matches!(resolve(project, text), Err(Refusal::Never(_))), "{text}");
+        }
+        for text in ["C:/x.glb", "c:x.glb", "C:\\x.glb"] {
+            let refused = resolve(project, text).unwrap_err();
+            assert_eq!(matches!(refused, Refusal::Never(_)), is_foreign(text), "{text}");
         }
     }
 

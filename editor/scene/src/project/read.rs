@@ -14,7 +14,7 @@ use super::record::{
     ShapeMeshRecord, ShapesRecord, missing_mesh, placeholder,
 };
 use super::unknown::ProjectFile;
-use super::{Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, migrate};
+use super::{Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, migrate, sound};
 use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, ShapeSource};
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
@@ -279,7 +279,14 @@ impl Loader<'_> {
         }
     }
 
-    fn add_node(&mut self, record: NodeRecord) -> Result<(), ProjectProblem> {
+    fn add_node(&mut self, mut record: NodeRecord) -> Result<(), ProjectProblem> {
+        let place = format!("node {} \"{}\"", record.id.0, record.name);
+        if let Some(reason) = sound::refusal(&record) {
+            return Err(ProjectProblem::Broken(format!("{place}: it {reason}")));
+        }
+        for repaired in sound::repair_rotations(&mut record) {
+            self.warn(place.clone(), repaired);
+        }
         let (id, node) = record.into_node();
         if let Some(parent) = node.parent.filter(|parent| self.document.node(*parent).is_none()) {
             return Err(ProjectProblem::Broken(format!(
@@ -333,6 +340,15 @@ impl Loader<'_> {
             }
             other => other.into(),
         };
+        let shines_below_zero = match &environment {
+            Environment::Constant(radiance) => radiance.min_element() < 0.0,
+            Environment::File(file) => file.scale < 0.0,
+            Environment::Auto | Environment::DefaultSky => false,
+        };
+        if shines_below_zero {
+            let reason = "environment: it takes light away: its radiance or scale is below 0";
+            return Err(ProjectProblem::Broken(reason.to_owned()));
+        }
         self.apply("environment", Edit::SetEnvironment(environment))
     }
 

@@ -326,10 +326,12 @@ impl Default for LocalRecord {
 
 impl LocalRecord {
     fn is_identity(&self) -> bool {
-        self.matrix.is_none()
-            && is_zero(&self.translation)
-            && is_unturned(&self.rotation)
-            && is_unscaled(&self.scale)
+        self.matrix.is_none() && !self.has_trs()
+    }
+
+    /// Whether a translation, rotation or scale is set.
+    pub fn has_trs(&self) -> bool {
+        !(is_zero(&self.translation) && is_unturned(&self.rotation) && is_unscaled(&self.scale))
     }
 }
 

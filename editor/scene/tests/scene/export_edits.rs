@@ -126,21 +126,63 @@ fn doubles_survive_to_the_last_digit() {
         rotation: DQuat::from_euler(glam::EulerRot::XYZ, 0.1, 0.2, 0.3).normalize(),
         scale: DVec3::new(1.0 + f64::EPSILON, -1e-17, 0.1 + 0.2),
     };
-    let shear = DMat3::from_cols(DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.3, 1.0, 1.0 / 7.0), DVec3::Z * 3.0);
-    let sheared = DAffine3::from_mat3_translation(shear, DVec3::splat(1.0 / 9.0));
     let top = add_group(&mut document, "third", None, Local::Trs(third));
-    let sheared = add_group(&mut document, "sheared", Some(top), Local::Matrix(sheared));
-    add_group(&mut document, "deep", Some(sheared), trs(1e-3, 2.0, 0.7));
+    add_group(&mut document, "deep", Some(top), trs(1e-3, 2.0, 0.7));
     for name in ["a.glb", "a.gltf"] {
-        let (path, done) = exported(&document, folder.path(), name);
+        let (path, _) = exported(&document, folder.path(), name);
         let nodes = read(&path).prefab.nodes().to_vec();
-        let locals = ["third", "sheared", "deep"].map(|name| {
+        let locals = ["third", "deep"].map(|name| {
             let of_name = |(_, node): &(NodeId, &Node)| node.name == name;
             document.nodes().find(of_name).unwrap().1.local
         });
         assert_eq!(nodes.iter().map(|node| node.local).collect::<Vec<_>>(), locals, "{name}");
         assert_eq!(worlds(&document), worlds(&placed(read(&path)))[1..], "{name}");
-        assert!(messages(&done.warnings).contains("node \"sheared\": its matrix has shear"));
+    }
+}
+
+/// Nodes, a part and a primitive with shear.
+fn sheared(folder: &Path) -> Document {
+    let mut scene = scene(folder);
+    let plate = scene.part(PLATE);
+    let mesh = scene.document.mesh_of(plate).unwrap();
+    let document = &mut scene.document;
+    let matrix = DMat3::from_cols(DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.3, 1.0, 1.0 / 7.0), DVec3::Z * 3.0);
+    let sheared = DAffine3::from_mat3_translation(matrix, DVec3::splat(1.0 / 9.0));
+    let top = add_group(document, "sheared", None, Local::Matrix(sheared));
+    add_group(document, "deep", Some(top), trs(1e-3, 2.0, 0.7));
+    set_local(document, plate, Local::Matrix(sheared));
+    apply(document, Edit::SetPrimitiveTransform { mesh, primitive: 1, mesh_from_primitive: sheared });
+    scene.document
+}
+
+/// A node below a sheared one, and a sheared primitive: where they are is the same, in nodes that the format allows.
+#[test]
+fn shear_becomes_two_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    let document = sheared(folder.path());
+    let (path, done) = exported(&document, folder.path(), "file.glb");
+    assert!(
+        messages(&done.warnings).contains("node \"sheared\": its matrix has shear"),
+        "{:?}",
+        done.warnings
+    );
+    let nodes = json_of(&path)["nodes"].as_array().unwrap().clone();
+    assert!(nodes.iter().all(|node| node.get("matrix").is_none()), "{nodes:#?}");
+    assert_eq!(
+        nodes
+            .iter()
+            .filter(|node| node["name"].as_str().is_some_and(|name| name.contains("(shear)")))
+            .count(),
+        4
+    );
+    let again = placed(read(&path));
+    let by_name = |document: &Document, name: &str| -> DAffine3 {
+        let (_, world) = worlds(document).into_iter().find(|(own, _)| own == name).unwrap();
+        DAffine3::from_cols_array(&world)
+    };
+    for name in ["deep", "sheared", "Plate"] {
+        let (before, after) = (by_name(&document, name), by_name(&again, name));
+        assert!(before.abs_diff_eq(after, 1e-14), "{name}: {before:?} {after:?}");
     }
 }
 
@@ -339,8 +381,13 @@ pub fn samples(folder: &Path) -> Vec<Document> {
     let strange_folder = folder.join("strange");
     std::fs::create_dir(&strange_folder).unwrap();
     strange(&strange_folder, "packet");
-    let mut samples =
-        vec![placed(full), moved, placed(read(&strange_folder.join("file.gltf"))), Document::new()];
+    let mut samples = vec![
+        placed(full),
+        moved,
+        sheared(folder),
+        placed(read(&strange_folder.join("file.gltf"))),
+        Document::new(),
+    ];
     let files = [crate::kept::strange_file(), crate::kept::loose_file(), crate::scenes::file()];
     for (number, file) in files.iter().enumerate() {
         let folder = folder.join(format!("file-{number}"));

@@ -220,6 +220,41 @@ fn other_files_and_newer_versions_are_refused_in_words() {
     assert!(load(orphan).to_string().contains("node 1"));
     let typed = load("{\"caustica\":2,\n\"nodes\":[{\"id\":\"x\"}]}");
     assert!(typed.to_string().contains("line 2"), "{typed}");
+    for (node, words) in [
+        (
+            r#""light":{"color":[1,1,1],"intensity":1,"kind":{"point":{"radius_m":0,"range_m":null}}},
+            "camera":{"projection":{"perspective":{"yfov_rad":1}},"near_m":0.1,"far_m":null,"aspect":null}"#,
+            "has light and camera",
+        ),
+        (
+            r#""local":{"matrix":[1,0,0,0,1,0,0,0,1,0,0,0],"translation":[1,0,0]}"#,
+            "a matrix beside translation",
+        ),
+    ] {
+        let both = load(&format!(r#"{{"caustica":2,"nodes":[{{"id":1,"name":"a",{node}}}]}}"#));
+        assert!(both.to_string().contains(words) && both.to_string().contains("node 1"), "{both}");
+    }
+    let dark = load(r#"{"caustica":2,"environment":{"kind":"constant","radiance":[0,-1,0]}}"#);
+    assert!(dark.to_string().contains("environment: it takes light away"), "{dark}");
+}
+
+#[test]
+fn rotations_that_are_none_are_put_right_with_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.caustica");
+    let text = r#"{"caustica":2,"nodes":[
+        {"id":1,"name":"still","local":{"rotation":[0,0,0,0],"translation":[1,2,3]}},
+        {"id":2,"name":"long","local":{"rotation":[0,0,0,2]}},
+        {"id":3,"name":"sound","local":{"rotation":[0,0,0.6,0.8]}}]}"#;
+    std::fs::write(&path, text).unwrap();
+    let project = Project::load(&path).unwrap();
+    let rotations = project.document.nodes().map(|(_, node)| node.local.nearest_trs().rotation.to_array());
+    let unturned = [0.0, 0.0, 0.0, 1.0];
+    assert_eq!(rotations.collect::<Vec<_>>(), [unturned, unturned, [0.0, 0.0, 0.6, 0.8]]);
+    let words: Vec<String> = project.warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(words.len(), 2, "{words:?}");
+    assert!(words[0].contains("node 1 \"still\"") && words[0].contains("has no length"), "{words:?}");
+    assert!(words[1].contains("node 2 \"long\"") && words[1].contains("not of length 1"), "{words:?}");
 }
 
 #[test]

@@ -20,6 +20,8 @@ pub(super) struct Tidy {
     pub short_faces: usize,
     /// Points, lines, curves and surfaces.
     pub other_elements: usize,
+    /// Calls of other files and of programs.
+    pub calls: usize,
 }
 
 /// A line number, from 1, and what is wrong there.
@@ -159,6 +161,7 @@ impl Writer {
             }
             Some("mtllib") => self.put("mtllib", &[rest(line)]),
             Some("p" | "l" | "curv" | "curv2" | "surf") => self.tidy.other_elements += 1,
+            Some("call" | "csh") => self.tidy.calls += 1,
             _ => {}
         }
         Ok(())
@@ -285,9 +288,10 @@ mod tests {
 
     #[test]
     fn corners_and_colours_are_made_even() {
-        let text = "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 1\nvt .5\nf 1/1 2 3\nl 1 2 3\nf 1 2\ng\n";
+        let text = "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 1\nvt .5\nf 1/1 2 3\nl 1 2 3\nf 1 2\ng\ncall a.obj\n";
         let expected = "vt 0 0\nv 0 0 0 1 0 0\nv 1 0 0 1 1 1\nv 0 1 0 1 1 1\nvt .5 0\nf 1/2 2/1 3/1\ng \n";
         let tidy = tidy(text).unwrap_or_default();
-        assert_eq!((tidy.text.as_str(), tidy.short_faces, tidy.other_elements), (expected, 1, 1));
+        let left_out = (tidy.short_faces, tidy.other_elements, tidy.calls);
+        assert_eq!((tidy.text.as_str(), left_out), (expected, (1, 1, 1)));
     }
 }

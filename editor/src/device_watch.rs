@@ -1,17 +1,16 @@
 //! Notices when a device does not come back, on a thread of its own: the one that waits for the device may be held by the driver.
 //! Enters: a device. Leaves: a call, once nothing was finished for so long that the device counts as hung.
 
+use std::io::Write as _;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use caustica_renderer::gpu::Device;
+use caustica_renderer::gpu::{Device, leave_process};
 
 /// So long whoever gave the device up may take to see to the rest: the driver may hold it.
 const SEEN_TO_WITHIN: Duration = Duration::from_secs(3);
-/// So long the end of a process may take whose driver does not answer.
-const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
 /// Watches until it is dropped.
 pub(crate) struct DeviceWatch {
@@ -80,14 +79,9 @@ fn watch(
     }
 }
 
-/// Ends the process, also when the driver does not let it clean up.
+/// Ends the process, also when the driver would not let it clean up.
 pub(crate) fn end(code: u8) -> ! {
-    let backstop = std::thread::Builder::new().spawn(|| {
-        std::thread::sleep(ENDS_WITHIN);
-        std::process::abort();
-    });
-    if let Err(error) = backstop {
-        tracing::debug!("no thread to end the process: {error}");
-    }
-    std::process::exit(code.into())
+    // Nothing could be done about it.
+    let _ = std::io::stdout().flush();
+    leave_process(code)
 }

@@ -41,6 +41,7 @@ pub use descriptors::{SceneLayout, SceneSet};
 pub use device_choice::{Candidate, DeviceKind, Requirements, list_devices};
 pub use error::GpuError;
 pub use frames::{FrameResult, Frames};
+pub use hang::leave_process;
 pub use image::{Format, Image, ImageDesc, ImageUse};
 pub use instance::{Instance, InstanceOptions, Message};
 pub use interface::{Bind, BindSort, Binding, BindingKind, Interface};

@@ -5,11 +5,15 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use caustica_renderer::shader::{ShaderFault, ShaderSources, ShaderStatus};
 use caustica_renderer::{NeedsMode, Pipeline, Primary, Show, ViewSettings};
+use caustica_tests::desktop::wait_for;
+use caustica_tests::models::cube;
 use caustica_tests::picture::bits;
+use caustica_tests::program::program;
 use caustica_tests::scene::zoo;
 use caustica_tests::shapes::{at, ball, mesh_of};
 use caustica_tests::studio::Studio;
@@ -299,4 +303,89 @@ fn resident_kib() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
     line.and_then(|line| line.trim().trim_end_matches(" kB").parse().ok()).unwrap_or_default()
+}
+
+/// `caustica render --watch`, ended at the end of the test.
+struct Watching {
+    process: Child,
+    folder: tempfile::TempDir,
+}
+
+impl Watching {
+    /// Starts it on a cube, with a folder of shaders, and waits for its first picture.
+    fn start(shaders: &Folder) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("cube.gltf"), cube(false)).expect("a model");
+        let said = fs::File::create(folder.path().join("said.txt")).expect("a file");
+        let process = Command::new(program())
+            .args(["render", "cube.gltf", "-o", "out.png", "--size", "24x16", "--samples", "2"])
+            .args(["--pipeline", "raster", "--watch", "--shaders"])
+            .arg(shaders.0.path())
+            .current_dir(folder.path())
+            .env("XDG_CONFIG_HOME", folder.path().join("config"))
+            .env("XDG_DATA_HOME", folder.path().join("data"))
+            .stdout(Stdio::null())
+            .stderr(said)
+            .spawn()
+            .expect("the program starts");
+        let watching = Self { process, folder };
+        watching.wait_for_words("watching cube.gltf and");
+        watching
+    }
+
+    fn wait_for_words(&self, words: &str) {
+        let said = || fs::read_to_string(self.folder.path().join("said.txt")).unwrap_or_default();
+        wait_for(words, PATIENCE.as_secs(), || said().contains(words).then_some(()));
+    }
+
+    /// The picture; it is whole at every moment.
+    fn picture(&self) -> Vec<u8> {
+        image::open(self.folder.path().join("out.png")).expect("a whole picture").to_rgb8().into_raw()
+    }
+
+    fn wait_for_picture(&self, what: &str, is_it: impl Fn(&[u8]) -> bool) {
+        wait_for(what, PATIENCE.as_secs(), || is_it(&self.picture()).then_some(()));
+    }
+}
+
+impl Drop for Watching {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+#[test]
+fn render_watches_shaders_and_the_scene() {
+    let shaders = Folder::new();
+    let watching = Watching::start(&shaders);
+    let first = watching.picture();
+    let (file, what) = ("passes/post/post.comp", "vec4(display_color(frame, pixel), 1.0)");
+    let text = shaders.text(file);
+    assert!(text.contains(what), "{file} has no {what}");
+    shaders.save(file, &text.replace(what, "vec4(1.0, 0.0, 0.0, 1.0)"), Save::InPlace);
+    let is_red = |picture: &[u8]| picture.chunks_exact(3).all(|pixel| pixel == [255, 0, 0]);
+    watching.wait_for_picture("a red picture", is_red);
+    // A mistake of grammar, of which the compiler names no word.
+    shaders.save(file, &text.replace(what, &format!("uvec2(pixel) {what}")), Save::InTwoSteps);
+    let line = text.lines().position(|line| line.contains(what)).expect("a line") + 1;
+    let column = text.lines().find_map(|line| line.find(what)).expect("a column") + "uvec2(pixel) ".len() + 1;
+    watching.wait_for_words(&format!("{file}:{line}:{column}: "));
+    watching.wait_for_words("the last picture stays until the shaders are mended");
+    assert!(is_red(&watching.picture()));
+    shaders.save(file, &text, Save::RenamedOver);
+    watching.wait_for_picture("the first picture", |picture| picture == first);
+
+    let model = watching.folder.path().join("cube.gltf");
+    fs::write(&model, &cube(false)[..100]).expect("half a model");
+    watching.wait_for_words("the last picture stays\n");
+    assert_eq!(watching.picture(), first);
+    let flat = cube(false).replace("\"mesh\":0", "\"mesh\":0,\"scale\":[1.0,0.1,1.0]");
+    assert_ne!(flat, cube(false));
+    fs::write(&model, flat).expect("another model");
+    watching.wait_for_picture("another scene", |picture| picture != first);
+    let beside = fs::read_dir(watching.folder.path()).expect("a folder").flatten();
+    let names: Vec<String> = beside.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    assert!(names.iter().all(|name| !name.ends_with(".new")), "{names:?}");
 }

@@ -144,20 +144,29 @@ fn refuse_sources(document: &Document, path: &Path) -> Result<(), ExportError> {
 }
 
 impl Document {
-    /// Whether a file is what the scene was read from: a model, an image beside it, an environment, a list of shapes.
+    /// Whether a file is one of [`Self::sources`].
     pub fn is_source(&self, path: &Path) -> bool {
         let Ok(real) = path.canonicalize() else { return false };
-        let is_same = |source: &Path| source.canonicalize().is_ok_and(|source| source == real);
-        let images = |folder: &Path| self.textures().any(|(_, texture)| is_same(&folder.join(&texture.name)));
-        let models = self
-            .prefabs()
-            .any(|(_, prefab)| is_same(&prefab.source) || prefab.source.parent().is_some_and(images));
-        let shapes =
-            self.meshes().filter_map(|(_, mesh)| mesh.shapes()).any(|shapes| match shapes.source() {
-                ShapeSource::File(file) => is_same(&file.path),
-                _ => false,
-            });
-        models || shapes || matches!(self.environment(), Environment::File(file) if is_same(&file.path))
+        self.sources().any(|source| source.canonicalize().is_ok_and(|source| source == real))
+    }
+
+    /// What the scene was read from: models, images beside them, an environment, lists of shapes. Some may not be there: which model
+    /// an image came with is not kept.
+    pub fn sources(&self) -> impl Iterator<Item = PathBuf> + '_ {
+        let models = self.prefabs().map(|(_, prefab)| prefab.source.clone());
+        let folders: BTreeSet<&Path> =
+            self.prefabs().filter_map(|(_, prefab)| prefab.source.parent()).collect();
+        let beside = move |name: String| folders.clone().into_iter().map(move |folder| folder.join(&name));
+        let images = self.textures().flat_map(move |(_, texture)| beside(texture.name.clone()));
+        let shapes = self.meshes().filter_map(|(_, mesh)| match mesh.shapes()?.source() {
+            ShapeSource::File(file) => Some(file.path.clone()),
+            _ => None,
+        });
+        let environment = match self.environment() {
+            Environment::File(file) => Some(file.path.clone()),
+            _ => None,
+        };
+        models.chain(images).chain(shapes).chain(environment)
     }
 }
 

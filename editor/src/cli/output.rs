@@ -55,8 +55,22 @@ pub(super) fn write_png(path: &Path, extent: [u32; 2], display: &[[f32; 4]]) -> 
     let bytes: Vec<u8> = display.iter().flat_map(|[r, g, b, _]| [*r, *g, *b].map(srgb_byte)).collect();
     let image =
         image::RgbImage::from_raw(extent[0], extent[1], bytes).context("the image is not complete")?;
+    replace(path, |path| Ok(image.save_with_format(path, image::ImageFormat::Png)?))
+}
+
+/// Writes a file beside the one of this name, and puts it in its place when it is whole: who looks at the picture, or ends the
+/// program, never has half of it.
+fn replace(path: &Path, write: impl FnOnce(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
     make_folder(path)?;
-    image.save_with_format(path, image::ImageFormat::Png).with_context(|| path.display().to_string())
+    // What a link leads to is replaced, not the link.
+    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let temporary = real.with_extension(format!("{}.new", std::process::id()));
+    let written = write(&temporary).and_then(|()| Ok(std::fs::rename(&temporary, &real)?));
+    if written.is_err() {
+        // It may not be there at all.
+        let _ = std::fs::remove_file(&temporary);
+    }
+    written.with_context(|| path.display().to_string())
 }
 
 /// Linear 0..1 to the nearest sRGB byte (IEC 61966-2-1).
@@ -100,8 +114,8 @@ pub(super) fn write_exr(
     note("caustica.sampler", AttributeValue::Text(Text::from(metadata.sampler)));
     note("caustica.seed", AttributeValue::Text(Text::from(metadata.seed.to_string().as_str())));
     let layer = Layer::new(size, attributes, ENCODING, channels);
-    make_folder(path)?;
-    Image::from_layer(layer).write().to_file(path).with_context(|| path.display().to_string())
+    let image = Image::from_layer(layer);
+    replace(path, |path| Ok(image.write().to_file(path)?))
 }
 
 fn make_folder(path: &Path) -> anyhow::Result<()> {

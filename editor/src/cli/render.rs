@@ -1,6 +1,7 @@
 //! `caustica render`: a project or model to an image file.
 
 mod args;
+mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::IsTerminal;
@@ -23,7 +24,7 @@ use args::{settings_of, without_effect};
 
 use super::DeviceArgs;
 use super::output::{self, Kind, Metadata};
-use crate::session::{Session, SessionOptions, ViewCamera, environment_argument};
+use crate::session::{Loaded, Session, SessionOptions, ViewCamera, environment_argument};
 
 /// Frames of which the times are kept for the median.
 const TIMED_FRAMES: usize = 4096;
@@ -52,9 +53,6 @@ pub(super) fn run(
 ) -> anyhow::Result<ExitCode> {
     let kind = output::kind_of(&args.output)?;
     let shaders = shaders.or_else(|| args.watch.then(super::shader_folder).flatten());
-    if args.watch && shaders.is_none() {
-        bail!("--watch: there is no folder of shaders here; name one with --shaders DIR");
-    }
     let (wake, woken) = channel();
     let watch_shaders = args.watch.then(|| {
         WakeFn(Arc::new(move || {
@@ -69,30 +67,46 @@ pub(super) fn run(
         progress.set_message(step.to_owned());
         progress.set_position((share * 100.0) as u64);
     })?;
-    let environment = args.environment.as_deref().map(environment_argument).transpose()?;
+    // A mistake in it is said before a device is opened.
+    args.environment.as_deref().map(environment_argument).transpose()?;
     let device = device.open()?;
     let _watch = DeviceArgs::watch(&device);
     let mut session = Session::new(
         &device,
         SessionOptions { shaders, watch_shaders, extent: args.size, ..SessionOptions::default() },
     )?;
+    open(&mut session, args, loaded)?;
+    let loaded_in = start.elapsed();
+    picture(&mut session, args, kind, &progress, loaded_in)?;
+    if args.watch {
+        watch::follow(&mut session, args, &woken, |session, loaded_in| {
+            picture(session, args, kind, &progress, loaded_in)
+        })?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Shows what was loaded as the arguments say.
+fn open(session: &mut Session, args: &RenderArgs, loaded: Loaded) -> anyhow::Result<()> {
+    // What the file does not say is as at the start, whatever was shown before.
+    session.set_settings(ViewSettings::default());
     session.open_at(&args.file, loaded, args.at)?;
     if args.at.is_some() && session.duration().is_none() {
         bail!("{}: --at was given, but no clip of it is played: nothing is animated", args.file.display());
     }
-    if let Some(environment) = environment {
-        session.push(Edit::SetEnvironment(environment))?;
+    if let Some(environment) = &args.environment {
+        session.push(Edit::SetEnvironment(environment_argument(environment)?))?;
     }
     if session.document().is_source(&args.output) {
         bail!("{}: is a source of this scene; choose another name", args.output.display());
     }
     if let Some(name) = &args.scene {
-        choose_scene(&mut session, name).with_context(|| args.file.display().to_string())?;
+        choose_scene(session, name).with_context(|| args.file.display().to_string())?;
         let aspect = f64::from(args.size[0]) / f64::from(args.size[1]);
         session.set_camera(ViewCamera::of_document(session.document(), None, aspect));
     }
     if let Some(name) = &args.variant {
-        choose_variant(&mut session, name).with_context(|| args.file.display().to_string())?;
+        choose_variant(session, name).with_context(|| args.file.display().to_string())?;
     }
     if let Some(name) = &args.camera {
         let known: Vec<String> =
@@ -103,7 +117,7 @@ pub(super) fn run(
         }
         session.set_camera(ViewCamera::of_document(session.document(), Some(name), 1.0));
     }
-    let show_light = args.show_light.as_deref().map(|name| light_of(&session, name)).transpose()?;
+    let show_light = args.show_light.as_deref().map(|name| light_of(session, name)).transpose()?;
     let settings = settings_of(args, session.settings().clone());
     for what in without_effect(args, &settings) {
         tracing::warn!("without effect: {what}");
@@ -113,17 +127,7 @@ pub(super) fn run(
     if args.sample_offset > 0 {
         session.set_sample_offset(args.sample_offset)?;
     }
-    let loaded_in = start.elapsed();
-    picture(&mut session, args, kind, &progress, loaded_in)?;
-    if args.watch {
-        eprintln!("watching the shaders (end with Ctrl+C)");
-    }
-    while args.watch && woken.recv().is_ok() {
-        if session.take_over_shaders() {
-            picture(&mut session, args, kind, &progress, loaded_in)?;
-        }
-    }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// Renders one picture, writes it and says so.

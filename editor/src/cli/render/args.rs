@@ -97,8 +97,8 @@ pub(in crate::cli) struct RenderArgs {
     /// The light of `--show shadow`: its name, or its number from 1; without it the first that shines
     #[arg(long, value_name = "NAME|N")]
     pub(super) show_light: Option<String>,
-    /// Go on, and render again whenever a shader changes in the folder of --shaders, else in that of the checkout (end it with
-    /// Ctrl+C)
+    /// Go on, and render again whenever the scene changes, its models, images and environment with it, or a shader in the folder of
+    /// --shaders, else in that of the checkout. What is wrong with them is told, and the last picture stays. Ends with Ctrl+C
     #[arg(long)]
     pub(super) watch: bool,
     /// Print one JSON object on standard output

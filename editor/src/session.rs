@@ -10,13 +10,13 @@ mod room;
 mod tally;
 mod view_size;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use caustica_renderer::delta::LightId;
 use caustica_renderer::gpu::{Device, Frames};
-use caustica_renderer::shader::{HeldShader, ShaderLibrary, ShaderStatus, Wake};
+use caustica_renderer::shader::{HeldShader, ShaderFiles, ShaderLibrary, ShaderStatus, Wake};
 use caustica_renderer::{
     AccelPolicy, DeviceProfile, ProfileInForce, Renderer, RendererOptions, ViewId, ViewSettings, WakeFn,
 };
@@ -143,6 +143,11 @@ impl Session {
         self.renderer.shader_status()
     }
 
+    /// Whether edited shaders are being compiled, or are ready to be taken over.
+    pub fn compiles_shaders(&self) -> bool {
+        self.renderer.compiles_shaders()
+    }
+
     /// All shaders.
     pub fn shader_library(&self) -> &Arc<ShaderLibrary> {
         self.renderer.shader_library()
@@ -154,7 +159,7 @@ impl Session {
     }
 
     /// The shader files that the picture is made of: main files with what they include.
-    pub fn shader_files(&self) -> BTreeMap<String, Vec<String>> {
+    pub fn shader_files(&self) -> Arc<ShaderFiles> {
         self.renderer.shader_files()
     }
 

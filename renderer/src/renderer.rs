@@ -19,7 +19,8 @@ use crate::passes::{Builder, PassSet, ScenePasses};
 use crate::sampling::Sampling;
 use crate::settings::{Pipeline, Primary, ViewSettings};
 use crate::shader::{
-    HeldShader, Reloader, ShaderLibrary, ShaderSources, ShaderStatus, SpirvCache, TakenOver, Wake,
+    HeldShader, Reloader, ShaderFiles, ShaderLibrary, ShaderSources, ShaderStatus, SpirvCache, TakenOver,
+    Wake,
 };
 use crate::summary::Summary;
 use crate::tables::{Changed, Tables, changes_image};
@@ -209,7 +210,7 @@ impl Renderer {
     }
 
     /// The shader files that pipelines were made of so far: main files with what they include.
-    pub fn shader_files(&self) -> BTreeMap<String, Vec<String>> {
+    pub fn shader_files(&self) -> Arc<ShaderFiles> {
         self.library.files()
     }
 
@@ -221,6 +222,11 @@ impl Renderer {
     /// How it stands with shaders that are edited.
     pub fn shader_status(&self) -> ShaderStatus {
         self.reloader.as_ref().map(Reloader::status).unwrap_or_default()
+    }
+
+    /// Whether edited shaders are being compiled, or are ready to be taken over.
+    pub fn compiles_shaders(&self) -> bool {
+        self.reloader.as_ref().is_some_and(|reloader| reloader.is_compiling() || reloader.is_waiting())
     }
 
     fn invalidate(&mut self, what: Invalidation, reason: &str) {

@@ -15,7 +15,7 @@ mod watch;
 
 pub use compile::{SpirvCache, compile};
 pub use fault::ShaderFault;
-pub use library::{Compiled, ShaderLibrary, merge_interfaces};
+pub use library::{Compiled, ShaderFiles, ShaderLibrary, merge_interfaces};
 pub use reflect::{Reflection, reflect};
 pub use reload::{Reload, ShaderStatus, Wake};
 pub use sources::{ShaderSources, Source};

@@ -210,6 +210,8 @@ impl Editor {
     }
 
     fn take_keys(&mut self, context: &Context) {
+        // Its panel says so again when it is drawn.
+        let types_shader = std::mem::take(&mut self.state.shaders.has_focus);
         // A drag that ends in this frame is still open: its keys wait for the next one, or a slow device would lose them.
         let released = context.input(|input| !input.pointer.primary_down());
         if self.state.view.drag.is_some() && released {
@@ -232,9 +234,8 @@ impl Editor {
                 return;
             }
             // While a shader is typed in, it is what is saved.
-            let has_focus = self.state.shaders.has_focus;
             let of_shader =
-                |action| if has_focus && action == Action::Save { Action::SaveShader } else { action };
+                |action| if types_shader && action == Action::Save { Action::SaveShader } else { action };
             self.state.actions.extend(pressed.into_iter().map(of_shader));
         }
     }

@@ -4,27 +4,40 @@
 use std::sync::Arc;
 
 use caustica_renderer::shader::ShaderFault;
-use egui::text::{LayoutJob, TextFormat};
+use egui::text::{CCursor, CCursorRange, LayoutJob, TextFormat};
+use egui::text_edit::TextEditState;
 use egui::{
-    Align, Align2, Color32, FontId, Galley, Pos2, Rect, ScrollArea, TextBuffer, TextEdit, TextStyle, Ui, vec2,
+    Align, Align2, Color32, FontId, Galley, Id, Pos2, Rect, ScrollArea, TextBuffer, TextEdit, TextStyle, Ui,
+    vec2,
 };
 
 /// Width of the line numbers, points.
 const NUMBERS: f32 = 36.0;
 
-/// Draws the field; `go_to`: scroll to this line. Returns whether it is being typed in.
-pub fn field(ui: &mut Ui, text: &mut String, faults: &[&ShaderFault], go_to: Option<u32>) -> bool {
+/// Draws the field; `id`: of this text; `go_to`: put the cursor at this line and column. Returns whether it is being typed in.
+pub fn field(
+    ui: &mut Ui,
+    id: Id,
+    text: &mut String,
+    faults: &[&ShaderFault],
+    go_to: Option<[u32; 2]>,
+) -> bool {
+    if let Some(place) = go_to {
+        put_cursor(ui, id, text, place);
+    }
     let font = TextStyle::Monospace.resolve(ui.style());
     let colors = Colors::of(ui);
     let mut layouter = |ui: &Ui, text: &dyn TextBuffer, _: f32| -> Arc<Galley> {
         ui.fonts_mut(|fonts| fonts.layout_job(colored(text.as_str(), &font, colors)))
     };
     ScrollArea::both()
+        .id_salt(id)
         .auto_shrink([false, false])
         .show(ui, |ui| {
             ui.horizontal_top(|ui| {
                 ui.add_space(NUMBERS);
                 let edit = TextEdit::multiline(text)
+                    .id(id)
                     .code_editor()
                     .frame(egui::Frame::NONE)
                     .desired_width(f32::INFINITY)
@@ -40,15 +53,29 @@ pub fn field(ui: &mut Ui, text: &mut String, faults: &[&ShaderFault], go_to: Opt
                     );
                     let of_line = faults.iter().find(|fault| fault.line == Some(line));
                     mark_line(ui, &font, line, rect, of_line.copied(), colors);
-                    if go_to == Some(line) {
+                    if go_to.is_some_and(|[wanted, _]| wanted == line) {
                         ui.scroll_to_rect(rect.expand2(vec2(0.0, 60.0)), Some(Align::Center));
                     }
                 }
-                output.response.response.has_focus()
+                let response = output.response.response;
+                if go_to.is_some() {
+                    // Not before: the click that led here was outside of the text, which takes the keyboard from it.
+                    response.request_focus();
+                }
+                response.has_focus()
             })
             .inner
         })
         .inner
+}
+
+/// Puts the cursor at a line and column.
+fn put_cursor(ui: &Ui, id: Id, text: &str, [line, column]: [u32; 2]) {
+    let before = text.split_inclusive('\n').take(line.saturating_sub(1) as usize);
+    let at = before.map(|line| line.chars().count()).sum::<usize>() + column.saturating_sub(1) as usize;
+    let mut state = TextEditState::load(ui.ctx(), id).unwrap_or_default();
+    state.cursor.set_char_range(Some(CCursorRange::one(CCursor::new(at))));
+    state.store(ui.ctx(), id);
 }
 
 /// The number of a line, and what is wrong with it.
@@ -182,4 +209,36 @@ fn token(text: &str, first: char, line_begins: bool, colors: Colors) -> (usize, 
     }
     let plain = |c: char| !c.is_alphanumeric() && !matches!(c, '_' | '/' | '#' | '\n');
     (if first == '\n' { 1 } else { while_of(&plain).max(first.len_utf8()) }, colors.plain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What comes above the field, such as a list of errors, must not take the keyboard from it: Ctrl+S and Ctrl+Z would be about
+    /// the scene.
+    #[test]
+    fn a_text_keeps_the_keyboard_and_the_cursor_whatever_comes_above_it() {
+        let context = egui::Context::default();
+        let (id, mut text) = (Id::new("text"), String::from("one\ntwo\n"));
+        let frame = |text: &mut String, labels: usize, go_to, events: Vec<egui::Event>| {
+            let mut has_focus = false;
+            let input = egui::RawInput { events, ..egui::RawInput::default() };
+            let _ = context.run_ui(input, |ui| {
+                for _ in 0..labels {
+                    ui.label("an error");
+                }
+                has_focus = field(ui, id, text, &[], go_to);
+            });
+            has_focus
+        };
+        frame(&mut text, 0, Some([2, 2]), Vec::new());
+        assert!(frame(&mut text, 0, None, vec![egui::Event::Text("X".into())]));
+        assert_eq!(text, "one\ntXwo\n");
+        assert!(frame(&mut text, 3, None, vec![egui::Event::Text("Y".into())]));
+        assert_eq!(text, "one\ntXYwo\n");
+        frame(&mut text, 0, Some([99, 1]), Vec::new());
+        assert!(frame(&mut text, 0, None, vec![egui::Event::Text("end".into())]));
+        assert_eq!(text, "one\ntXYwo\nend");
+    }
 }

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use caustica_renderer::shader::{ShaderFault, ShaderStatus, Watching};
-use egui::{Panel, RichText, ScrollArea, Ui};
+use egui::{Id, Panel, RichText, ScrollArea, Ui};
 use egui_phosphor::regular as icon;
 
 use super::{Cx, code};
@@ -59,7 +59,7 @@ fn files(cx: &mut Cx<'_>, ui: &mut Ui, folder: &Path, status: &ShaderStatus) {
                 chosen = Some(file.to_owned());
             }
         };
-        for (main, includes) in &all {
+        for (main, includes) in all.iter() {
             let modified = |file: &str| cx.state.shaders.is_modified(file);
             row(ui, main, main.strip_prefix("passes/").unwrap_or(main), modified(main));
             let is_open = shown.as_ref() == Some(main);
@@ -75,8 +75,8 @@ fn files(cx: &mut Cx<'_>, ui: &mut Ui, folder: &Path, status: &ShaderStatus) {
     }
 }
 
-fn show(cx: &mut Cx<'_>, folder: &Path, file: &str, line: Option<u32>) {
-    if let Err(error) = cx.state.shaders.show(folder, file, line) {
+fn show(cx: &mut Cx<'_>, folder: &Path, file: &str, place: Option<[u32; 2]>) {
+    if let Err(error) = cx.state.shaders.show(folder, file, place) {
         cx.state.toasts.error(error);
     }
 }
@@ -91,17 +91,20 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, folder: &Path, status: &ShaderStatus) {
             let save = ui.add_enabled(modified, button("Save"));
             if save.on_hover_text("Save the file; the picture follows (Ctrl+S)").clicked() {
                 cx.act(Action::SaveShader);
+                cx.state.shaders.wants_focus = true;
             }
             let revert = ui.add_enabled(modified, button("Revert"));
             if revert.on_hover_text("Back to what is on the disk").clicked() {
                 cx.state.shaders.revert();
+                cx.state.shaders.wants_focus = true;
             }
             let differs = cx.state.shaders.differs_from_built_in();
             let restore = ui.add_enabled(differs, button("Restore the built-in version"));
-            if restore.on_hover_text("Save the text that came with the program in its place").clicked()
-                && let Err(error) = cx.state.shaders.restore_built_in(folder)
-            {
-                cx.state.toasts.error(error);
+            if restore.on_hover_text("Save the text that came with the program in its place").clicked() {
+                cx.state.shaders.wants_focus = true;
+                if let Err(error) = cx.state.shaders.restore_built_in(folder) {
+                    cx.state.toasts.error(error);
+                }
             }
             ui.separator();
         }
@@ -147,13 +150,13 @@ fn faults(cx: &mut Cx<'_>, ui: &mut Ui, folder: &Path, status: &ShaderStatus) {
             let label = RichText::new(fault.to_string()).monospace().color(error);
             let link = ui.add(egui::Label::new(label).sense(egui::Sense::click()));
             if link.on_hover_text("Show the place").clicked() {
-                chosen = Some((fault.file.clone(), fault.line));
+                chosen = Some((fault.file.clone(), fault.line.map(|line| [line, fault.column.unwrap_or(1)])));
             }
         }
     });
     ui.separator();
-    if let Some((file, line)) = chosen {
-        show(cx, folder, &file, line);
+    if let Some((file, place)) = chosen {
+        show(cx, folder, &file, place);
     }
 }
 
@@ -164,13 +167,18 @@ fn text(cx: &mut Cx<'_>, ui: &mut Ui, status: &ShaderStatus) {
             ui,
             "Choose a file to the left. What is saved is shown at once, by whatever program it was saved.",
         );
-        texts.has_focus = false;
         return;
     };
     let of_file: Vec<&ShaderFault> = status.faults.iter().filter(|fault| fault.file == file).collect();
+    // Of each file its own, wherever it is: what can be undone, the cursor and what is scrolled to.
+    let id = Id::new(("shader text", &file));
     let go_to = texts.go_to.take();
     if let Some(text) = texts.text_mut() {
-        let has_focus = code::field(ui, text, &of_file, go_to);
+        let has_focus = code::field(ui, id, text, &of_file, go_to);
         texts.has_focus = has_focus;
+    }
+    // After the text, as a click outside of it takes the keyboard from it.
+    if std::mem::take(&mut texts.wants_focus) {
+        ui.memory_mut(|memory| memory.request_focus(id));
     }
 }

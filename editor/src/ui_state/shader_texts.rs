@@ -19,26 +19,28 @@ pub struct ShaderTexts {
     open: BTreeMap<String, Text>,
     /// The one that is shown.
     pub shown: Option<String>,
-    /// Show this line next, from 1.
-    pub go_to: Option<u32>,
-    /// The text is being typed in: Ctrl+S is about it.
+    /// Put the cursor here next: line and column, from 1.
+    pub go_to: Option<[u32; 2]>,
+    /// Whether the text was typed in in the last frame: Ctrl+S is about it.
     pub has_focus: bool,
+    /// The text gets the keyboard, as after a button above it, so that Ctrl+Z is about the text.
+    pub wants_focus: bool,
     /// How many changes of the folder were heard of when it was looked at last.
     heard: u64,
 }
 
 impl ShaderTexts {
-    /// Shows a file, at a line.
+    /// Shows a file, with the cursor at a line and column.
     ///
     /// # Errors
     /// When it cannot be read.
-    pub fn show(&mut self, folder: &Path, file: &str, line: Option<u32>) -> Result<(), String> {
+    pub fn show(&mut self, folder: &Path, file: &str, place: Option<[u32; 2]>) -> Result<(), String> {
         if !self.open.contains_key(file) {
             let saved = read(folder, file)?;
             self.open.insert(file.to_owned(), Text { now: saved.clone(), saved });
         }
         self.shown = Some(file.to_owned());
-        self.go_to = line;
+        self.go_to = place;
         Ok(())
     }
 
@@ -167,7 +169,7 @@ mod tests {
         write_built_in(folder.path()).unwrap();
         let (file, other) = ("lib/fresnel.glsl", "passes/post/post.comp");
         let mut texts = ShaderTexts::default();
-        texts.show(folder.path(), file, Some(3)).unwrap();
+        texts.show(folder.path(), file, Some([3, 1])).unwrap();
         assert!(!texts.differs_from_built_in() && texts.modified().is_empty());
         texts.text_mut().unwrap().push_str("// mine\n");
         texts.show(folder.path(), other, None).unwrap();

@@ -120,7 +120,9 @@ fn compile_now(source: &Source) -> Result<Vec<u32>> {
         source_language: SourceLanguage::GLSL,
         target: Target::Vulkan { version: VulkanVersion::Vulkan1_3, spirv_version: SpirvVersion::SPIRV1_6 },
         version_profile: Some((460, GlslProfile::None)),
-        messages: ShaderMessage::DEFAULT | ShaderMessage::CASCADING_ERRORS,
+        messages: ShaderMessage::DEFAULT
+            | ShaderMessage::CASCADING_ERRORS
+            | ShaderMessage::DISPLAY_ERROR_COLUMN,
     };
     let glsl = ShaderSource::from(text);
     let mut includes = Includes { texts: &source.texts };

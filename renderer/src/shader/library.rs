@@ -51,6 +51,9 @@ impl Compiled {
     }
 }
 
+/// Main files, each with every file that it includes.
+pub type ShaderFiles = BTreeMap<String, Vec<String>>;
+
 /// All stages compiled so far, and the pipelines in use. Shared with the thread that compiles what was edited.
 pub struct ShaderLibrary {
     pub(super) device: Arc<Device>,
@@ -59,6 +62,8 @@ pub struct ShaderLibrary {
     /// Shaders are edited: one that is broken when it is needed for the first time is replaced by the built-in one.
     edited: AtomicBool,
     stages: Mutex<HashMap<String, Arc<Compiled>>>,
+    /// What [`Self::files`] says, until there is another stage.
+    listed: Mutex<Option<Arc<ShaderFiles>>>,
     replaced: Mutex<Vec<ShaderFault>>,
     suspects: Mutex<Suspects>,
     live: Mutex<Vec<Weak<dyn Replaceable>>>,
@@ -68,9 +73,9 @@ impl ShaderLibrary {
     /// An empty library. `edited`: a stage that is broken when it is needed first is replaced by the built-in one.
     pub fn new(device: &Arc<Device>, sources: ShaderSources, cache: SpirvCache, edited: bool) -> Self {
         let device = Arc::clone(device);
-        let (stages, replaced, suspects, live) = Default::default();
+        let (stages, listed, replaced, suspects, live) = Default::default();
         let (sources, edited) = (Mutex::new(sources), AtomicBool::new(edited));
-        Self { device, sources, cache, edited, stages, replaced, suspects, live }
+        Self { device, sources, cache, edited, stages, listed, replaced, suspects, live }
     }
 
     /// The stage of a main file; compiled at the first call.
@@ -99,6 +104,7 @@ impl ShaderLibrary {
         }
         let stage = Arc::new(stage);
         lock(&self.stages).insert(file.to_owned(), Arc::clone(&stage));
+        *lock(&self.listed) = None;
         Ok(stage)
     }
 
@@ -177,12 +183,18 @@ impl ShaderLibrary {
         lock(&self.stages).values().cloned().collect()
     }
 
-    /// The main files of all stages compiled so far, each with every file that it includes.
-    pub fn files(&self) -> BTreeMap<String, Vec<String>> {
+    /// The main files of all stages compiled so far, each with every file that it includes. Cheap: asked for in every frame.
+    pub fn files(&self) -> Arc<ShaderFiles> {
+        // Held meanwhile: a stage that comes after the stages were looked at takes the list away again.
+        let mut listed = lock(&self.listed);
         let includes = |stage: &Compiled| {
             stage.source.texts.keys().filter(|file| *file != stage.file()).cloned().collect()
         };
-        self.all_stages().iter().map(|stage| (stage.file().to_owned(), includes(stage))).collect()
+        let list = || {
+            let stages = self.all_stages();
+            Arc::new(stages.iter().map(|stage| (stage.file().to_owned(), includes(stage))).collect())
+        };
+        Arc::clone(listed.get_or_insert_with(list))
     }
 
     pub(super) fn known(&self, file: &str) -> Option<Arc<Compiled>> {
@@ -217,6 +229,7 @@ impl ShaderLibrary {
             }
         }
         lock(&self.stages).extend(stages.into_iter().map(|stage| (stage.file().to_owned(), stage)));
+        *lock(&self.listed) = None;
         for live in self.all_live() {
             let stale = live.files().iter().any(|file| files.contains(*file))
                 && !live.is_of(&|file| self.known(file));

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::num::NonZero;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -157,6 +157,11 @@ impl Reloader {
         status
     }
 
+    /// Whether something is being compiled.
+    pub(crate) fn is_compiling(&self) -> bool {
+        self.compiling.load(Ordering::Relaxed)
+    }
+
     /// Whether there is something to take over.
     pub(crate) fn is_waiting(&self) -> bool {
         self.waiting.load(Ordering::Acquire) > 0
@@ -241,6 +246,8 @@ fn work(
         loop {
             match hints.recv_timeout(QUIET) {
                 Ok(Hint::Look(files)) => hinted.push(files),
+                // Opened to be written, and its text is still to come.
+                Err(RecvTimeoutError::Timeout) if hinted.iter().flatten().any(|file| is_empty(file)) => {}
                 Err(RecvTimeoutError::Timeout) => break,
                 Ok(Hint::Stop) | Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -256,6 +263,10 @@ fn work(
             return;
         }
     }
+}
+
+fn is_empty(file: &Path) -> bool {
+    std::fs::metadata(file).is_ok_and(|about| about.is_file() && about.len() == 0)
 }
 
 /// The paths of files inside the folder; `None`: any may have changed.

@@ -72,7 +72,7 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
         let settings = ViewSettings { pipeline, primary, ..ViewSettings::default() };
         let mut session = session_of(bench, Some(folder.path()), &settings, extent_px)?;
         let files: Vec<String> =
-            session.shader_files().into_keys().filter(|file| seen.insert(file.clone())).collect();
+            session.shader_files().keys().filter(|file| seen.insert((*file).clone())).cloned().collect();
         let bar = bench.bar(pipeline.name(), files.len());
         for file in files {
             bar.set_message(file.clone());

@@ -1,13 +1,17 @@
 //! One window: events in, frames out. Enters: winit's events. Leaves: pictures on the screen. A frame is drawn only
 //! when there is a reason: input, an unfinished picture, an animation. How one is made is in `window/frames.rs`.
 
+mod apart;
 mod frames;
+mod pace;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use caustica_renderer::gpu::{Device, DeviceOptions, Instance, InstanceOptions, Requirements, Swapchain};
+use caustica_renderer::gpu::{
+    Device, DeviceKind, DeviceOptions, Instance, InstanceOptions, Requirements, Swapchain,
+};
 use caustica_renderer::{ViewSettings, WakeFn};
 use egui::ViewportId;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
@@ -15,6 +19,9 @@ use winit::dpi::LogicalSize;
 use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::window::Window;
+
+use apart::Apart;
+use pace::Pace;
 
 use super::AppOptions;
 use super::actions::Action;
@@ -88,6 +95,8 @@ pub(super) struct EditorWindow {
     kept: Option<Instant>,
     ui: UiRenderer,
     swapchain: Swapchain,
+    /// Where the renderer's device is a processor: the one that draws the panels.
+    apart: Option<Apart>,
     editor: Editor,
     input: egui_winit::State,
     context: egui::Context,
@@ -113,6 +122,7 @@ pub(super) struct EditorWindow {
     samples: u64,
     /// The next picture waits until the device has finished this one.
     waits_for_device: bool,
+    pace: Pace,
     title: String,
     device: Arc<Device>,
     window: Arc<Window>,
@@ -145,8 +155,10 @@ impl EditorWindow {
             &DeviceOptions { requirements, memory_limit_bytes: options.memory_limit_bytes },
         )?;
         let size = window.inner_size();
-        let swapchain = Swapchain::new(&device, display, handle, [size.width, size.height])?;
-        let ui = UiRenderer::new(&device, &swapchain)?;
+        let apart = (device.kind() == DeviceKind::Cpu).then(|| Apart::new(&device)).transpose()?;
+        let of_panels = apart.as_ref().map_or(&device, Apart::device);
+        let swapchain = Swapchain::new(of_panels, display, handle, [size.width, size.height])?;
+        let ui = UiRenderer::new(of_panels, &swapchain)?;
         let context = egui::Context::default();
         theme::install(&context, config.dark);
         // A second pass would carry out clicks twice.
@@ -191,6 +203,7 @@ impl EditorWindow {
             kept: None,
             ui,
             swapchain,
+            apart,
             editor,
             input,
             context,
@@ -208,6 +221,7 @@ impl EditorWindow {
             silent: false,
             samples: 0,
             waits_for_device: false,
+            pace: Pace::default(),
             title: String::new(),
             device,
             window,
@@ -229,10 +243,12 @@ impl EditorWindow {
 
     /// The time that was waited for has come.
     pub(super) fn time_reached(&mut self) {
+        let panels_wait = self.panels_due.is_none_or(|due| Instant::now() < due);
         // A lost device shows itself in the next frame.
-        if self.waits_for_device && self.device.has_finished().is_ok_and(|finished| !finished) {
+        let is_busy = self.waits_for_device && self.device.has_finished().is_ok_and(|finished| !finished);
+        if is_busy && (panels_wait || self.apart.is_none()) {
             self.redraw_at = Instant::now().checked_add(DEVICE_POLL);
-        } else if self.silent && self.panels_due.is_none_or(|due| Instant::now() < due) {
+        } else if self.silent && panels_wait {
             self.carry_on();
         } else {
             self.request_redraw();
@@ -267,6 +283,19 @@ impl EditorWindow {
         self.rescue.keep(self.editor.to_keep());
     }
 
+    /// Says in the log how fast the window answered while edited shaders came into use.
+    fn note_pace(&mut self, start: Instant) {
+        let session = &self.editor.session;
+        let counts =
+            session.shader_folder().is_some() && (session.compiles_shaders() || self.rescue.has_suspects());
+        if let Some((longest, frames)) = self.pace.drawn(start, counts) {
+            let ms = longest.as_secs_f64() * 1e3;
+            tracing::info!(
+                "shaders: input was answered within {ms:.0} ms meanwhile ({frames} frames of the window)"
+            );
+        }
+    }
+
     /// Where the device is gone, starts the program again; comes back when that cannot be.
     fn start_again(&self, error: anyhow::Error) -> anyhow::Error {
         match frames::device_gone(&error) {
@@ -289,7 +318,9 @@ impl EditorWindow {
         if matches!(event, WindowEvent::RedrawRequested) {
             let silent =
                 self.silent && !self.must_resize && self.panels_due.is_none_or(|due| Instant::now() < due);
+            let start = Instant::now();
             let drawn = if silent { self.silent_frame() } else { self.frame() };
+            self.note_pace(start);
             drawn.map_err(|error| self.start_again(error))?;
             return Ok(if self.editor.should_quit() { Next::Quit } else { Next::GoOn });
         }

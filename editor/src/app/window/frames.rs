@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use caustica_renderer::RendererError;
-use caustica_renderer::gpu::{Access, GpuError, Recorder, Stage, Use};
+use caustica_renderer::gpu::{Access, Acquired, GpuError, Recorder, Stage, Use};
 use egui::ViewportId;
 use egui::epaint::ClippedPrimitive;
 
@@ -16,6 +16,8 @@ use crate::theme;
 const SLOW_MS: f64 = 80.0;
 /// Longest time without a new picture while there is input.
 const PICTURE_AT_LEAST_EVERY: Duration = Duration::from_millis(250);
+/// While the renderer's device is at work beside them panels are drawn no more often, except for input.
+const PANELS_AT_MOST_EVERY: Duration = Duration::from_millis(33);
 /// Label of the pass that draws the panels.
 const UI_PASS: &str = "ui";
 
@@ -36,7 +38,7 @@ impl EditorWindow {
         self.keep();
         let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
         self.ui.set_textures(output.textures_delta)?;
-        let recorder = self.picture()?;
+        let recorder = if self.apart.is_some() { self.picture_apart()? } else { self.picture()? };
         self.present(recorder, output.pixels_per_point, primitives)?;
         self.had_input = false;
         let delay =
@@ -68,23 +70,40 @@ impl EditorWindow {
 
     /// Renders the view where that is due; else only opens a frame for the panels.
     fn picture(&mut self) -> anyhow::Result<Recorder> {
-        let (recorder, is_picture) = self.picture_or_panels()?;
-        self.continuous = is_picture;
-        Ok(recorder)
+        let picture = self.picture_if_due()?;
+        self.continuous = picture.is_some();
+        match picture {
+            Some(recorder) => Ok(recorder),
+            None => self.editor.session.begin_ui_frame(),
+        }
     }
 
-    /// True: the recorder holds a picture.
-    fn picture_or_panels(&mut self) -> anyhow::Result<(Recorder, bool)> {
-        let Some(full) = self.editor.state.view.extent_px else {
-            return self.panels_alone();
-        };
+    /// Fetches a picture that the renderer's device has finished, gives it the next one to do where that is due, and opens a frame of
+    /// the panels' device.
+    fn picture_apart(&mut self) -> anyhow::Result<Recorder> {
+        let Some(apart) = &mut self.apart else { return self.picture() };
+        let panels = apart.begin(&mut self.editor.session)?;
+        if apart.is_pending() {
+            return Ok(panels);
+        }
+        let picture = self.picture_if_due()?;
+        self.continuous = picture.is_some();
+        if let (Some(recorder), Some(apart)) = (picture, &mut self.apart) {
+            apart.submit_picture(&mut self.editor.session, recorder)?;
+        }
+        Ok(panels)
+    }
+
+    /// A frame of the renderer with the view, where that is due.
+    fn picture_if_due(&mut self) -> anyhow::Result<Option<Recorder>> {
+        let Some(full) = self.editor.state.view.extent_px else { return Ok(None) };
         let key = self.key(full);
         let fresh = self.shown.as_ref() == Some(&key);
         let waits =
             fresh && self.had_input && self.is_slow() && self.last_picture.elapsed() < PICTURE_AT_LEAST_EVERY;
         let done = fresh && self.editor.session.is_done();
         if waits || done || self.broken.as_ref().is_some_and(|broken| broken.holds(&key)) {
-            return self.panels_alone();
+            return Ok(None);
         }
         let config = &self.editor.state.config;
         let target_ms = config.adaptive.then_some(f64::from(config.target_frame_ms));
@@ -100,7 +119,7 @@ impl EditorWindow {
                 self.editor.state.view.divisor = self.editor.session.divisor();
                 self.shown = Some(key);
                 self.note_times();
-                Ok((recorder, true))
+                Ok(Some(recorder))
             }
             Err(error) if is_fatal(&error) => Err(error),
             Err(error) => {
@@ -110,13 +129,9 @@ impl EditorWindow {
                     self.editor.state.toasts.error(format!("The picture cannot be rendered: {error:#}."));
                 }
                 self.broken = Some(Broken::after(again, key));
-                self.panels_alone()
+                Ok(None)
             }
         }
-    }
-
-    fn panels_alone(&mut self) -> anyhow::Result<(Recorder, bool)> {
-        Ok((self.editor.session.begin_ui_frame()?, false))
     }
 
     fn key(&self, extent: [u32; 2]) -> PictureKey {
@@ -148,7 +163,11 @@ impl EditorWindow {
         points: f32,
         primitives: Vec<ClippedPrimitive>,
     ) -> anyhow::Result<()> {
-        if let Some(image) = self.editor.session.window_image() {
+        let image = match &self.apart {
+            Some(apart) => apart.picture(),
+            None => self.editor.session.window_image(),
+        };
+        if let Some(image) = image {
             self.ui.set_view(image)?;
             recorder.declare(&[Use::Image(image, Stage::Raster, Access::Sampled)]);
         }
@@ -161,7 +180,7 @@ impl EditorWindow {
             Err(error) => return Err(error).context("asking for the window's image"),
         };
         let Some(acquired) = acquired else {
-            self.editor.session.submit(recorder, None)?;
+            self.submit_panels(recorder, None)?;
             self.window.request_redraw();
             return Ok(());
         };
@@ -176,7 +195,7 @@ impl EditorWindow {
             swapchain.end_rendering(recorder, &acquired);
             Ok::<(), GpuError>(())
         })?;
-        self.editor.session.submit(recorder, Some(&acquired))?;
+        self.submit_panels(recorder, Some(&acquired))?;
         drawn?;
         self.window.pre_present_notify();
         match self.swapchain.present(acquired) {
@@ -190,16 +209,30 @@ impl EditorWindow {
         }
     }
 
+    fn submit_panels(&mut self, recorder: Recorder, window: Option<&Acquired>) -> anyhow::Result<()> {
+        match &mut self.apart {
+            Some(apart) => apart.submit(recorder, window),
+            None => self.editor.session.submit(recorder, window),
+        }
+    }
+
     /// Goes on with a picture that takes several submits, without drawing the panels: nothing they show has changed.
     pub(super) fn silent_frame(&mut self) -> anyhow::Result<()> {
         let Some(full) = self.editor.state.view.extent_px else {
             self.request_redraw();
             return Ok(());
         };
+        if self.apart.is_some() && !self.device.has_finished()? {
+            self.go_on_soon();
+            return Ok(());
+        }
         match self.editor.session.begin_frame(full) {
             Ok(recorder) => {
                 self.editor.state.view.divisor = self.editor.session.divisor();
-                self.editor.session.submit(recorder, None)?;
+                match &mut self.apart {
+                    Some(apart) => apart.submit_picture(&mut self.editor.session, recorder)?,
+                    None => self.editor.session.submit(recorder, None)?,
+                }
             }
             Err(error) if is_fatal(&error) => return Err(error),
             Err(error) => {
@@ -237,7 +270,12 @@ impl EditorWindow {
         self.panels_due = Instant::now().checked_add(repaint_delay);
         let goes_on = (unfinished || plays) && !self.occluded;
         self.continuous &= goes_on;
-        if goes_on && !repaint_delay.is_zero() {
+        if let Some(apart) = self.apart.as_ref().filter(|apart| apart.is_pending()) {
+            // The panels leave the processor to the picture, but for what is moving in them.
+            self.panels_due = Instant::now().checked_add(repaint_delay.max(PANELS_AT_MOST_EVERY));
+            self.silent = goes_on && fresh && whole && nothing_new && !plays && apart.shows(samples);
+            self.go_on_soon();
+        } else if goes_on && !repaint_delay.is_zero() {
             self.silent = fresh && whole && nothing_new && !plays;
             self.go_on_soon();
         } else if goes_on || repaint_delay.is_zero() || !nothing_new {
@@ -250,7 +288,7 @@ impl EditorWindow {
 
     /// The next picture: at once, or when a slow device has finished this one.
     fn go_on_soon(&mut self) {
-        if self.is_slow() {
+        if self.apart.is_some() || self.is_slow() {
             // Never two slow pictures in a row on the queue: panels that react to input would wait for both.
             self.waits_for_device = true;
             self.redraw_at = Instant::now().checked_add(DEVICE_POLL);

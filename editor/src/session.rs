@@ -143,11 +143,6 @@ impl Session {
         self.renderer.shader_status()
     }
 
-    /// Whether edited shaders are being compiled, or are ready to be taken over.
-    pub fn compiles_shaders(&self) -> bool {
-        self.renderer.compiles_shaders()
-    }
-
     /// All shaders.
     pub fn shader_library(&self) -> &Arc<ShaderLibrary> {
         self.renderer.shader_library()

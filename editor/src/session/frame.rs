@@ -196,6 +196,11 @@ impl Session {
         self.renderer.is_busy()
     }
 
+    /// Whether edited shaders are being compiled, or are ready to be taken over.
+    pub fn compiles_shaders(&self) -> bool {
+        self.renderer.compiles_shaders()
+    }
+
     /// What is seen through a pixel of the last frame. Waits for the device.
     ///
     /// # Errors

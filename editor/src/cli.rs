@@ -203,6 +203,7 @@ fn document_of(file: &Path, sources: SourceArgs) -> anyhow::Result<(Document, Ve
             let prefab = document.add_imported(*imported)?;
             let (_, place) = document.instantiate_edit(prefab, None, Local::default());
             document.apply(place)?;
+            document.update_transforms();
             warnings
         }
         Loaded::Shapes(shapes) => {

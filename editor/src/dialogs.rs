@@ -78,6 +78,24 @@ enum Shown {
     },
 }
 
+/// What was chosen in a dialog.
+pub struct Chosen {
+    /// What for.
+    pub wish: Wish,
+    /// The file.
+    pub path: PathBuf,
+    /// It has another name than was typed and confirmed, and is there already.
+    pub replaces_unasked: bool,
+}
+
+impl Chosen {
+    fn new(wish: Wish, typed: PathBuf) -> Self {
+        let path = with_ending(wish, typed.clone());
+        let replaces_unasked = path != typed && path.exists();
+        Self { wish, path, replaces_unasked }
+    }
+}
+
 /// The one file dialog that may be open.
 #[derive(Default)]
 pub struct Dialogs {
@@ -114,14 +132,14 @@ impl Dialogs {
     }
 
     /// Draws the own dialog and asks the portal; gives the chosen path once.
-    pub fn update(&mut self, context: &egui::Context) -> Option<(Wish, PathBuf)> {
+    pub fn update(&mut self, context: &egui::Context) -> Option<Chosen> {
         match self.shown.take()? {
             Shown::Portal { wish, since, job, folder, file_name } => match job.poll() {
                 Answer::Running => {
                     self.shown = Some(Shown::Portal { wish, since, job, folder, file_name });
                     None
                 }
-                Answer::Done(Some(path)) => Some((wish, with_ending(wish, path))),
+                Answer::Done(Some(path)) => Some(Chosen::new(wish, path)),
                 Answer::Done(None) if since.elapsed() > NOT_SHOWN => None,
                 Answer::Done(None) | Answer::Died => {
                     self.no_portal = true;
@@ -138,7 +156,7 @@ impl Dialogs {
                         self.shown = Some(Shown::Own { wish, dialog });
                         None
                     }
-                    DialogState::Picked(path) => Some((wish, with_ending(wish, path.clone()))),
+                    DialogState::Picked(path) => Some(Chosen::new(wish, path.clone())),
                     _ => None,
                 }
             }
@@ -205,5 +223,15 @@ mod tests {
         assert_eq!(named(Wish::Export, "room.v2"), PathBuf::from("/a/room.v2.glb"));
         assert_eq!(named(Wish::Export, "room.GLTF"), PathBuf::from("/a/room.GLTF"));
         assert_eq!(named(Wish::Open, "room.glb"), PathBuf::from("/a/room.glb"));
+    }
+
+    #[test]
+    fn a_name_that_was_completed_does_not_replace_a_file_unasked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("room.caustica.json"), "").expect("a file");
+        let replaces = |name: &str| Chosen::new(Wish::SaveAs, folder.path().join(name)).replaces_unasked;
+        let found = ["room", "room.json", "hall", "room.caustica.json"].map(replaces);
+        // The dialog asks about the last one by itself.
+        assert_eq!(found, [true, true, false, false]);
     }
 }

@@ -132,6 +132,8 @@ pub struct Prefab {
     nodes: Vec<PartNode>,
     subtree_end: Vec<u32>,
     segments: Vec<String>,
+    /// Parts in order of parent and segment.
+    by_segment: Vec<u32>,
     skins: Vec<Skin>,
     /// Which skins a part is a joint of.
     skins_of_joint: BTreeMap<u32, Vec<u32>>,
@@ -171,6 +173,9 @@ impl Prefab {
         self.subtree_end = subtree_ends(&nodes)?;
         self.segments = path_segments(&nodes);
         self.nodes = nodes;
+        let mut by_segment: Vec<u32> = (0..self.nodes.len() as u32).collect();
+        by_segment.sort_unstable_by(|a, b| self.parent_and_segment(*a).cmp(&self.parent_and_segment(*b)));
+        self.by_segment = by_segment;
         self.index_skins();
         Ok(())
     }
@@ -280,11 +285,17 @@ impl Prefab {
     pub fn part_at(&self, path: &PartPath) -> Option<u32> {
         let mut at = None;
         for segment in path.0.split('/') {
-            at = Some(
-                self.children(at).find(|&c| self.segments.get(c as usize).is_some_and(|s| s == segment))?,
-            );
+            let wanted = (at, Some(segment));
+            let found = self.by_segment.binary_search_by(|part| self.parent_and_segment(*part).cmp(&wanted));
+            at = Some(*self.by_segment.get(found.ok()?)?);
         }
         at
+    }
+
+    /// No two parts have both in common.
+    fn parent_and_segment(&self, part: u32) -> (Option<u32>, Option<&str>) {
+        let parent = self.node(part).and_then(|node| node.parent);
+        (parent, self.segments.get(part as usize).map(String::as_str))
     }
 }
 

@@ -14,7 +14,7 @@ use super::after_hang::AfterHang;
 use super::export::Exporting;
 use super::files::Loading;
 use super::recovery::{Recovering, Watch};
-use crate::dialogs::Dialogs;
+use crate::dialogs::{Dialogs, Wish};
 use crate::panels::{self, Cx, bars, overlays};
 use crate::session::Session;
 use crate::theme;
@@ -59,6 +59,8 @@ pub struct Editor {
     pub(super) restoring: Option<Box<AfterHang>>,
     /// The project that was opened, and files that it names outside of its folder, while the user is asked about them.
     pub(super) outside: Option<(PathBuf, Vec<PathBuf>)>,
+    /// A file that is there already and was not named in full, while the user is asked about it.
+    pub(super) replacing: Option<(Wish, PathBuf)>,
     /// Files to import after the present one.
     pub(super) waiting: VecDeque<PathBuf>,
     /// The audit that is running, and the state of the document that it looks at.
@@ -95,6 +97,7 @@ impl Editor {
             opened: None,
             restoring: None,
             outside: None,
+            replacing: None,
             waiting: VecDeque::new(),
             audit: None,
             question: None,
@@ -282,8 +285,10 @@ impl Editor {
     }
 
     fn overlays(&mut self, context: &Context) {
-        if let Some((wish, path)) = self.dialogs.update(context) {
-            self.chosen(wish, path);
+        match self.dialogs.update(context) {
+            Some(chosen) if chosen.replaces_unasked => self.replacing = Some((chosen.wish, chosen.path)),
+            Some(chosen) => self.chosen(chosen.wish, chosen.path),
+            None => {}
         }
         let progress = self.loading.as_ref().map(|loading| (loading.label(), loading.progress()));
         if let Some((label, progress)) = progress
@@ -305,6 +310,8 @@ impl Editor {
         overlays::drop_hint(context);
         if self.question.is_some() {
             self.ask_about_changes(context);
+        } else if self.replacing.is_some() {
+            self.ask_to_replace(context);
         } else if !self.left_behind.is_empty() {
             self.ask_to_recover(context);
         } else {
@@ -314,7 +321,10 @@ impl Editor {
 
     /// Whether a question waits for its answer.
     fn asks(&self) -> bool {
-        self.question.is_some() || !self.left_behind.is_empty() || self.outside.is_some()
+        self.question.is_some()
+            || self.replacing.is_some()
+            || !self.left_behind.is_empty()
+            || self.outside.is_some()
     }
 
     fn ask_about_changes(&mut self, context: &Context) {

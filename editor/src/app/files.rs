@@ -260,6 +260,7 @@ impl Editor {
                     }
                 }
                 self.state.toasts.info(format!("Saved {}.", short(path)));
+                self.tell_of_absent_sources();
                 if let Some(kept) = self.session.scene_mut().take_set_aside() {
                     self.state.toasts.warning(format!(
                         "Another program had saved {} since it was opened here. What it saved is kept as {}.",
@@ -275,6 +276,30 @@ impl Editor {
                 self.after_save = None;
                 self.state.toasts.error(format!("The scene is not saved: {error:#}."));
             }
+        }
+    }
+
+    /// Says which sources are not where the project that was just saved names them, as after their folder was moved.
+    fn tell_of_absent_sources(&mut self) {
+        let prefabs = self.session.document().prefabs().map(|(_, prefab)| prefab);
+        // Those that were missing from the start were told of when the project was opened.
+        let absent = prefabs.filter(|prefab| !prefab.missing && !prefab.source.exists());
+        let absent: Vec<PathBuf> = absent.map(|prefab| prefab.source.clone()).collect();
+        for source in &absent {
+            tracing::warn!(
+                "{}: is not there any more; put it back or choose another source",
+                source.display()
+            );
+        }
+        if let Some(first) = absent.first() {
+            let more = match absent.len() {
+                1 => String::new(),
+                count => format!(" and {} more", count - 1),
+            };
+            let first = first.display();
+            self.state
+                .toasts
+                .warning(format!("{first}{more}: not there any more, but named in the project."));
         }
     }
 

@@ -1,4 +1,5 @@
-//! Questions about what a project or another run has left: unsaved changes, and files outside of the project's folder.
+//! Questions about files that are there: unsaved changes of another run, files outside of the project's folder, and files that a
+//! name that was completed would replace.
 //! Enters: what was found. Leaves: a recovered scene, read on a worker, or files that stay as they are.
 
 use std::path::Path;
@@ -182,6 +183,20 @@ impl Editor {
                 let message = "Reading the unsaved changes failed in a way that was not foreseen; they stay where they are.";
                 self.state.toasts.error(message);
             }
+        }
+    }
+
+    pub(super) fn ask_to_replace(&mut self, context: &Context) {
+        let Some((_, path)) = &self.replacing else { return };
+        let [replace, keep] = ["Replace it", "Choose another name"];
+        let answer = ask(context, "Replace the file?", [replace, keep], keep, |ui| {
+            ui.label(format!("{} is there already. Replace it?", path.display()));
+        });
+        let Some(answer) = answer else { return };
+        let Some((wish, path)) = self.replacing.take() else { return };
+        match answer == replace {
+            true => self.chosen(wish, path),
+            false => self.ask(wish),
         }
     }
 

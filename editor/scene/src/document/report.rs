@@ -41,6 +41,8 @@ impl Document {
 
     /// Makes the next drain tell of everything as added, as for a renderer that starts afresh.
     pub fn mark_all_added(&mut self, reason: &str) {
+        // Whoever asks for places before the next drain would walk up to the root each time.
+        self.update_transforms();
         self.changes = ChangeSet {
             environment: true,
             structure: true,

@@ -11,8 +11,13 @@ use crate::import::leads_out;
 /// Writes to a temporary file in the same folder, makes it durable and renames it into place.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let path = behind_links(path)?;
+    let before = fs::metadata(&path).ok();
+    if let Some(reason) = before.as_ref().and_then(refusal) {
+        return Err(io::Error::new(io::ErrorKind::PermissionDenied, reason));
+    }
+    let permissions = before.map(|before| before.permissions());
     let temporary = beside(&path, &format!(".{}.tmp", std::process::id()));
-    let written = write_durably(&temporary, bytes)
+    let written = write_durably(&temporary, bytes, permissions.as_ref())
         .and_then(|()| keep_backup(&path))
         .and_then(|()| fs::rename(&temporary, &path))
         .and_then(|()| sync_folder(&path));
@@ -45,8 +50,21 @@ fn create(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-fn write_durably(path: &Path, bytes: &[u8]) -> io::Result<()> {
+/// Why a file that is there must not be replaced.
+fn refusal(before: &fs::Metadata) -> Option<&'static str> {
+    match (before.is_file(), before.permissions().readonly()) {
+        (false, _) => Some("is not a file; choose another name"),
+        (true, true) => Some("is write-protected; make it writable, or choose another name"),
+        (true, false) => None,
+    }
+}
+
+/// Who may read the file before may read the one in its place, and nobody else.
+fn write_durably(path: &Path, bytes: &[u8], permissions: Option<&fs::Permissions>) -> io::Result<()> {
     let mut file = create(path)?;
+    if let Some(permissions) = permissions {
+        file.set_permissions(permissions.clone())?;
+    }
     file.write_all(bytes)?;
     file.sync_all()
 }
@@ -57,10 +75,18 @@ fn keep_backup(path: &Path) -> io::Result<()> {
         return Ok(());
     }
     let temporary = beside(path, ".bak.tmp");
-    let mut copy = create(&temporary)?;
-    io::copy(&mut File::open(path)?, &mut copy)?;
-    copy.sync_all()?;
-    fs::rename(&temporary, backup_of(path))
+    let copied = copy_durably(path, &temporary).and_then(|()| fs::rename(&temporary, backup_of(path)));
+    if copied.is_err() {
+        let _ = fs::remove_file(&temporary);
+    }
+    copied
+}
+
+fn copy_durably(from: &Path, to: &Path) -> io::Result<()> {
+    let (mut file, mut copy) = (File::open(from)?, create(to)?);
+    copy.set_permissions(file.metadata()?.permissions())?;
+    io::copy(&mut file, &mut copy)?;
+    copy.sync_all()
 }
 
 /// Where the file before the last save is.
@@ -124,6 +150,27 @@ mod tests {
         write(&folder.join("near.caustica"), b"four").unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "four");
         assert_eq!(fs::read_to_string(&precious).unwrap(), "mine");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn who_may_read_and_write_a_file_stays_as_it_was() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.caustica");
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        let set_mode = |mode| fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+        fs::write(&path, "one").unwrap();
+        set_mode(0o600);
+        write(&path, b"two").unwrap();
+        assert_eq!((mode(&path), mode(&backup_of(&path))), (0o600, 0o600));
+        set_mode(0o444);
+        assert!(write(&path, b"three").unwrap_err().to_string().contains("write-protected"));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "two");
+        let taken = folder.path().join("taken");
+        fs::create_dir(&taken).unwrap();
+        assert!(write(&taken, b"x").unwrap_err().to_string().contains("not a file"));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
     }
 
     #[test]

@@ -257,6 +257,20 @@ fn rotations_that_are_none_are_put_right_with_a_word() {
     assert!(words[1].contains("node 2 \"long\"") && words[1].contains("not of length 1"), "{words:?}");
 }
 
+/// Else whoever asks for the place of each node of a deep tree walks up to the root each time.
+#[test]
+fn places_are_known_once_a_project_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = edited(folder.path());
+    let path = folder.path().join("scene.caustica");
+    Project::save(&path, &scene.document, &ProjectMeta::default()).unwrap();
+    let mut read = Project::load(&path).unwrap().document;
+    assert_eq!(read.update_transforms(), 0);
+    scene.document.mark_all_added("again");
+    assert_eq!(scene.document.update_transforms(), 0);
+    assert!(!read.drain_changes().added.is_empty(), "all of it is told of as new");
+}
+
 #[test]
 fn ids_stay_unique_after_loading() {
     let folder = tempfile::tempdir().unwrap();

@@ -84,6 +84,9 @@ pub enum RendererError {
         /// What was found.
         reason: String,
     },
+    /// A picture is none, or not of the size of another.
+    #[error("{0}")]
+    Picture(String),
     /// A device was not measured, or its profile was not written.
     #[error("{what}: {reason}")]
     Profile {

@@ -2,9 +2,15 @@
 
 mod accel_bench;
 mod device_profile;
+mod error;
+mod flip;
+mod noise;
 mod primary_bench;
 mod statistics;
 
 pub use accel_bench::{AccelBench, BareStructure, BlasTimes, TlasTimes};
 pub use device_profile::{DeviceProfile, PrimaryTimes, ProfileInForce};
+pub use error::{ErrorMetrics, Radiance, relative_error_map};
+pub use flip::{Flip, flip_hdr, flip_ldr};
+pub use noise::{Estimate, Noise};
 pub use statistics::{AccelStatistics, LeftOut, Statistics, TlasWork};

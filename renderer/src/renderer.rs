@@ -70,6 +70,8 @@ pub struct PickHit {
 pub struct Accumulated {
     /// Columns and rows.
     pub extent: [u32; 2],
+    /// Samples in every pixel, dropped ones included.
+    pub samples: u64,
     /// Mean radiance a pixel, linear RGB, first row at the top.
     pub mean: Vec<[f32; 3]>,
     /// Half the difference of the means of streams A and B: an estimate of the error of the mean.

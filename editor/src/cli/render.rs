@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use caustica_renderer::delta::LightId;
-use caustica_renderer::{ViewSettings, WakeFn};
+use caustica_renderer::{Estimate, Noise, Pipeline, ViewSettings, WakeFn};
 use caustica_scene::Edit;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -155,7 +155,7 @@ fn picture(
     let denoised = args.denoises() && left_out.iter().all(|left| left.what != "temporal denoising");
     let accumulated = session.read_back()?;
     // Frames that share their past do not tell how far they are from the truth.
-    let noise = if denoised { None } else { noise_of(&accumulated, metadata.samples) };
+    let noise = if denoised { None } else { Noise::of(&accumulated) };
     match kind {
         Kind::Exr => output::write_exr(&args.output, args.size, &accumulated.mean, &metadata)?,
         Kind::Png => output::write_png(&args.output, args.size, &session.read_display()?)?,
@@ -172,8 +172,12 @@ fn picture(
             metadata.samples,
             metadata.seconds,
             metadata.pipeline,
-            noise.map_or_else(|| String::from("unknown"), |noise| format!("{:.2} %", noise * 100.0)),
-            if denoised { ", denoised: bias unknown" } else { "" },
+            noise.map_or_else(|| String::from("unknown"), in_words),
+            match (denoised, session.settings().pipeline) {
+                (true, _) => ", denoised: bias unknown",
+                (false, Pipeline::Path) => "",
+                (false, _) => ", bias unknown",
+            },
             metadata.device
         );
     }
@@ -272,9 +276,13 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
         if let Some(target) = args.target_error
             && done >= 16
             && done.is_power_of_two()
-            && noise_of(&session.read_back()?, done).is_some_and(|noise| noise <= target)
+            && let Some(noise) = Noise::of(&session.read_back()?)
         {
-            break;
+            if noise.error().value <= target {
+                break;
+            }
+            let left = noise.seconds_to(target, start.elapsed().as_secs_f64());
+            progress.set_message(format!("{}, about {:.0} s to go", in_words(noise), left.value.ceil()));
         }
     }
     session.finish()?;
@@ -282,20 +290,10 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     Ok(Run { samples: done, seconds: start.elapsed().as_secs_f64(), frames })
 }
 
-/// sqrt(relMSE) of the mean by the two streams: their half difference has the variance of the mean. `None` with one
-/// sample, which fills one stream only.
-fn noise_of(image: &caustica_renderer::Accumulated, samples: u64) -> Option<f64> {
-    if samples < 2 {
-        return None;
-    }
-    let terms = image.mean.iter().flatten().zip(image.half_difference.iter().flatten());
-    let sum: f64 = terms
-        .map(|(mean, half)| {
-            let (mean, half) = (f64::from(*mean), f64::from(*half));
-            half * half / (mean * mean + 0.01)
-        })
-        .sum();
-    Some((sum / (image.mean.len().max(1) * 3) as f64).sqrt())
+/// The noise with the interval that holds it in 95 of 100 cases.
+fn in_words(noise: Noise) -> String {
+    let Estimate { value, low, high } = noise.error();
+    format!("{:.2} % ({:.2} to {:.2})", value * 100.0, low * 100.0, high * 100.0)
 }
 
 fn summary(
@@ -303,7 +301,7 @@ fn summary(
     session: &Session,
     metadata: &Metadata,
     run: &Run,
-    noise: Option<f64>,
+    noise: Option<Noise>,
     denoised: bool,
     loaded_in: Duration,
 ) -> serde_json::Value {
@@ -327,7 +325,9 @@ fn summary(
         "seconds": metadata.seconds,
         "load_seconds": loaded_in.as_secs_f64(),
         "ms_per_pass": passes,
-        "noise": noise,
+        "noise": noise.map(|noise| noise.error().value),
+        "noise_interval": noise.map(|noise| [noise.error().low, noise.error().high]),
+        "efficiency": noise.map(|noise| noise.efficiency(metadata.seconds)),
         "denoised": denoised,
         "acceleration_structures": statistics.acceleration,
         "memory_bytes": memory,

@@ -101,10 +101,10 @@ impl ErrorMetrics {
             .zip(picture.blocks())
             .map(|(r, x)| squared(r, x, relative))
             .collect();
-        let [expected, found] = [reference, picture].map(|image| {
-            image.pixels.iter().fold([0.0; 3], |sum, pixel| add(sum, finite(*pixel)))
-        });
-        let luminance = |sums: [f64; 3]| sums.iter().zip(LUMINANCE).map(|(sum, weight)| sum * weight).sum::<f64>();
+        let [expected, found] = [reference, picture]
+            .map(|image| image.pixels.iter().fold([0.0; 3], |sum, pixel| add(sum, finite(*pixel))));
+        let luminance =
+            |sums: [f64; 3]| sums.iter().zip(LUMINANCE).map(|(sum, weight)| sum * weight).sum::<f64>();
         Ok(Self {
             rmse,
             rmse_trimmed,
@@ -113,7 +113,8 @@ impl ErrorMetrics {
             block_rel_mse: blocks.iter().sum::<f64>() / blocks.len() as f64,
             luminance_ratio: luminance(found) / luminance(expected),
             channel_ratios: [0, 1, 2].map(|channel| found[channel] / expected[channel]),
-            non_finite: picture.pixels.iter().filter(|pixel| !pixel.iter().all(|c| c.is_finite())).count() as u64,
+            non_finite: picture.pixels.iter().filter(|pixel| !pixel.iter().all(|c| c.is_finite())).count()
+                as u64,
         })
     }
 }
@@ -183,7 +184,8 @@ mod tests {
         // Two pixels in 2000 are the 0.1 % that the trimmed forms leave out.
         picture[7] = [4.0, 2.0, 0.0];
         picture[9] = [1.0, f32::NAN, 0.0];
-        let [reference, picture] = [&reference, &picture].map(|pixels| Radiance::new([50, 40], pixels).unwrap());
+        let [reference, picture] =
+            [&reference, &picture].map(|pixels| Radiance::new([50, 40], pixels).unwrap());
         let found = ErrorMetrics::of(&reference, &picture).unwrap();
         assert!((found.rmse - ((9.0 + 4.0) / 6000.0_f64).sqrt()).abs() < 1e-12, "{found:?}");
         let rel_mse = (9.0 / 1.01 + 4.0 / 4.01) / 6000.0;

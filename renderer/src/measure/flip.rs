@@ -172,3 +172,55 @@ fn hyab(a: [f32; 3], b: [f32; 3]) -> f32 {
 fn largest_color_difference() -> f32 {
     hyab(lab_of_hunt([0.0, 1.0, 0.0]), lab_of_hunt([0.0, 0.0, 1.0])).powf(COLOR_EXPONENT)
 }
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+    use super::*;
+
+    const EXTENT: [u32; 2] = [96, 64];
+
+    /// Slopes and a checker of bright and dark, and the same with noise.
+    fn pictures() -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+        let mut state = 1_u64;
+        let mut unit = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f64 / f64::from(1 << 24)
+        };
+        let places = (0..EXTENT[1]).flat_map(|y| (0..EXTENT[0]).map(move |x| (x, y)));
+        places
+            .map(|(x, y)| {
+                let checker = if (x / 8 + y / 8) % 2 == 1 { 4.0 } else { 0.1 };
+                let [width, height] = EXTENT.map(f64::from);
+                let pixel = [0.05 + f64::from(x) / width, 0.02 + f64::from(y) / height, checker];
+                let factor = (0.7 + 0.6 * unit()) as f32;
+                let pixel = pixel.map(|value| value as f32);
+                (pixel, pixel.map(|value| value * factor))
+            })
+            .unzip()
+    }
+
+    /// The figures are of `../shared/tools/compare_images.py` (flip_evaluator 1.7) for the same pictures.
+    #[test]
+    fn it_says_what_the_authors_say() {
+        let (reference, picture) = pictures();
+        let [reference, picture] =
+            [&reference, &picture].map(|pixels| Radiance::new(EXTENT, pixels).unwrap());
+        let ldr = flip_ldr(&reference, &picture, 1.0).unwrap();
+        assert!((ldr.mean - 0.127_520).abs() < 2e-5, "{}", ldr.mean);
+        let hdr = flip_hdr(&reference, &picture).unwrap().unwrap();
+        assert!((hdr.mean - 0.076_978).abs() < 2e-5, "{}", hdr.mean);
+        assert_eq!(flip_ldr(&reference, &reference, 1.0).unwrap().mean, 0.0);
+        assert!(ldr.map.iter().all(|value| (0.0..=1.0).contains(value)));
+    }
+
+    #[test]
+    fn black_has_no_exposure_and_what_is_not_finite_is_black() {
+        let black = vec![[0.0; 3]; 6144];
+        let broken = vec![[f32::NAN, f32::INFINITY, -1.0]; 6144];
+        let [black, broken] = [&black, &broken].map(|pixels| Radiance::new(EXTENT, pixels).unwrap());
+        assert_eq!(flip_hdr(&black, &broken).unwrap(), None);
+        assert_eq!(flip_ldr(&black, &broken, 1.0).unwrap().mean, 0.0);
+    }
+}

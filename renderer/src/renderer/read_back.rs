@@ -32,7 +32,7 @@ impl Renderer {
         frames.finish()?;
         let view = self.view_mut(id)?;
         frame::read_counters(view, slot);
-        Ok(mean_of(bytemuck::cast_slice(host.mapped()), view.extent()))
+        Ok(mean_of(bytemuck::cast_slice(host.mapped()), view.extent(), view.accumulation.samples()))
     }
 
     /// Reads the tone-mapped image of a view: linear RGBA half floats as floats. Waits for the device.
@@ -105,7 +105,7 @@ fn words_of<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
 }
 
 /// Mean and half difference of the two streams, in double precision.
-fn mean_of(pixels: &[AccumulatorPixel], extent: [u32; 2]) -> Accumulated {
+fn mean_of(pixels: &[AccumulatorPixel], extent: [u32; 2], samples: u64) -> Accumulated {
     let count = extent[0] as usize * extent[1] as usize;
     let (mut mean, mut half_difference) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for pixel in pixels.iter().take(count) {
@@ -121,7 +121,7 @@ fn mean_of(pixels: &[AccumulatorPixel], extent: [u32; 2]) -> Accumulated {
         mean.push([0, 1, 2].map(|c| channel(c) as f32));
         half_difference.push([0, 1, 2].map(|c| (0.5 * (of_stream(0, c) - of_stream(1, c))) as f32));
     }
-    Accumulated { extent, mean, half_difference }
+    Accumulated { extent, samples, mean, half_difference }
 }
 
 /// IEEE 754 binary16 to binary32.

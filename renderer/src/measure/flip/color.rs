@@ -54,7 +54,10 @@ mod tests {
         assert!(close(opponent_of([1.0; 3]), [100.0, 0.0, 0.0]));
         // L*a*b* of the red of Rec.709 is 53.24, 80.09, 67.20.
         let [l, a, b] = lab_of_hunt([1.0, 0.0, 0.0]);
-        assert!(close([l, a / (HUNT * l), b / (HUNT * l)].map(|v| v * 1e-2), [0.5324, 0.8009, 0.6720]), "{l} {a} {b}");
+        assert!(
+            close([l, a / (HUNT * l), b / (HUNT * l)].map(|v| v * 1e-2), [0.5324, 0.8009, 0.6720]),
+            "{l} {a} {b}"
+        );
         for rgb in [[0.2, 0.5, 0.7], [1.0, 0.0, 0.3]] {
             assert!(close(rgb_of_opponent(opponent_of(rgb)), rgb));
         }

@@ -178,7 +178,7 @@ fn edit_in_turn(folder: &Folder, studio: &mut Studio, file: &str, how: Save) {
     assert!(status.reloads > before, "{file}");
 }
 
-/// All takes half an hour on a processor: by default the stages of `hybrid`, and a few files that are included.
+/// All takes ten minutes on a busy processor: by default the stages of `hybrid`, and a few files that are included.
 #[test]
 fn every_shader_is_edited_in_turn_and_there_is_always_a_picture() {
     let all = std::env::var_os("CAUSTICA_RELOAD_ALL").is_some();

@@ -18,7 +18,7 @@ use crate::node::RayVisibility;
 use crate::package::AssetNames;
 use crate::transform::Local;
 
-mod scenes;
+pub(crate) mod scenes;
 
 pub use scenes::SourceScene;
 

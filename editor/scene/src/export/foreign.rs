@@ -11,6 +11,10 @@ use crate::foreign::{Foreign, Kept, KeptTexture, LooseMesh, Mapping, Unknown};
 use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
 use crate::prefab::Prefab;
 
+mod variants;
+
+use variants::Variants;
+
 /// The sources of a scene and what they brought.
 pub(super) struct Sources<'a> {
     document: &'a Document,
@@ -20,8 +24,7 @@ pub(super) struct Sources<'a> {
     meshes: BTreeMap<MeshId, (PrefabId, usize)>,
     materials: BTreeMap<MaterialId, (PrefabId, usize)>,
     textures: BTreeMap<TextureId, (PrefabId, usize)>,
-    /// Place of the first variant of each prefab among all.
-    first_variant: BTreeMap<PrefabId, usize>,
+    variants: Variants<'a>,
     /// What was left out, in words.
     pub warnings: Vec<String>,
 }
@@ -37,10 +40,9 @@ impl<'a> Sources<'a> {
             meshes: BTreeMap::new(),
             materials: BTreeMap::new(),
             textures: BTreeMap::new(),
-            first_variant: BTreeMap::new(),
+            variants: Variants::default(),
             warnings: Vec::new(),
         };
-        let mut variants = 0;
         for &(id, prefab) in &sources.prefabs {
             let foreign = &prefab.foreign;
             for name in foreign.file.extensions.keys() {
@@ -56,9 +58,8 @@ impl<'a> Sources<'a> {
             sources.materials.extend(prefab.materials.iter().enumerate().map(place));
             let place = |(place, texture): (usize, &TextureId)| (*texture, (id, place));
             sources.textures.extend(prefab.textures.iter().enumerate().map(place));
-            sources.first_variant.insert(id, variants);
-            variants += foreign.variants.len();
         }
+        sources.variants = Variants::of(&sources.prefabs, &mut sources.warnings);
         sources
     }
 
@@ -187,8 +188,7 @@ impl<'a> Sources<'a> {
 
     /// What the sources say about the file as a whole; after what the extensions that are read say of it.
     pub fn put_file(&self, file: &mut Object, used: &mut Extensions) {
-        let variants = self.prefabs.iter().flat_map(|(_, prefab)| prefab.foreign.variants.clone());
-        let variants: Vec<Value> = variants.collect();
+        let variants = self.variants.list();
         if !variants.is_empty() {
             let mut value = Object::new();
             value.put("variants", variants);
@@ -268,12 +268,15 @@ impl<'a> Sources<'a> {
         places: &BTreeMap<MaterialId, usize>,
         used: &mut Extensions,
     ) {
-        let (Some(prefab), Some(first)) = (self.prefab(id), self.first_variant.get(&id)) else { return };
+        let (Some(prefab), Some(variants)) = (self.prefab(id), self.variants.places.get(&id)) else { return };
         let mut mapping = |mapping: &Mapping| {
             let material = places.get(prefab.materials.get(mapping.material)?)?;
             let mut object = Object::new();
             object.put("material", *material);
-            object.put("variants", mapping.variants.iter().map(|v| v + first).collect::<Vec<_>>());
+            object.put(
+                "variants",
+                mapping.variants.iter().filter_map(|&v| variants.get(v).copied()).collect::<Vec<_>>(),
+            );
             object.put_text("name", &mapping.name);
             self.put(&mut object, Some((id, &mapping.unknown)), Object::new(), used);
             Some(Value::Object(object))

@@ -91,7 +91,7 @@ impl Prefab {
 }
 
 /// Names of which no two are the same: those without one are numbered, and the n-th of one name is `NAME#n`.
-fn told_apart(kind: &str, names: Vec<String>) -> Vec<String> {
+pub(crate) fn told_apart(kind: &str, names: Vec<String>) -> Vec<String> {
     let mut taken: BTreeSet<String> = names.iter().cloned().collect();
     let mut used: BTreeMap<String, usize> = BTreeMap::new();
     let own = |(place, name): (usize, String)| {

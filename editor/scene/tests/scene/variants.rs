@@ -78,3 +78,62 @@ fn two_variants_of_one_name_are_told_apart() {
     let again = load(&exported.files[0], &ImportOptions::default()).unwrap();
     assert_eq!(again.prefab.variants(), ["glowing", "glowing#2"], "as the source names them");
 }
+
+#[test]
+fn variants_of_one_name_in_several_sources_are_one_in_exports() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string({
+        crate::common::model(folder.path());
+        folder.path().join("model.gltf")
+    });
+    let text = text.unwrap();
+    let names = |first: &str, second: &str| {
+        text.replace(r#"[{"name":"plain"},{"name":"glowing"}]"#, &format!("[{first},{second}]"))
+    };
+    let mut document = caustica_scene::Document::new();
+    for (file, text) in [
+        ("a.gltf", names(r#"{"name":"red"}"#, r#"{"name":"blue"}"#)),
+        ("b.gltf", names(r#"{"name":"blue","extras":1}"#, r#"{"name":"red"}"#)),
+        ("c.gltf", names(r#"{"name":"red"}"#, r#"{"name":"red"}"#)),
+        ("d.gltf", names(r#"{"name":"blue"}"#, "{}")),
+    ] {
+        let path = folder.path().join(file);
+        std::fs::write(&path, text).unwrap();
+        let prefab = document.add_imported(load(&path, &ImportOptions::default()).unwrap()).unwrap();
+        let (_, edit) = document.instantiate_edit(prefab, None, Default::default());
+        document.apply(edit).unwrap();
+    }
+    let exported = caustica_scene::export(&document, &folder.path().join("out.glb")).unwrap();
+    let lost = |message: &str| message.contains("the variant \"blue\"") && message.starts_with("b: ");
+    assert!(exported.warnings.iter().any(|warning| lost(&warning.message)), "{:?}", exported.warnings);
+    let again = load(&exported.files[0], &ImportOptions::default()).unwrap();
+    assert_eq!(again.prefab.variants(), ["red", "blue", "red#2", "variant 2"]);
+    let mut one = caustica_scene::Document::new();
+    let prefab = one.add_imported(again).unwrap();
+    let (node, edit) = one.instantiate_edit(prefab, None, Default::default());
+    one.apply(edit).unwrap();
+    let glows = |document: &caustica_scene::Document, node| {
+        let plates = document.renderables().filter(|plate| plate.target.node == node);
+        let glows = |material: MaterialId| document.material(material).unwrap().name == "Glow";
+        plates.map(|plate| glows(plate.materials[0])).collect::<Vec<bool>>()
+    };
+    for (variant, expected) in [
+        ("red", [false, true, false, false]),
+        ("blue", [true, false, false, false]),
+        ("red#2", [false, false, true, false]),
+        ("variant 2", [false, false, false, true]),
+    ] {
+        one.apply(Edit::SetVariant { node, variant: Some(variant.to_owned()) }).unwrap();
+        assert_eq!(glows(&one, node), expected, "{variant}");
+        // In the scene itself each instance is asked for the name.
+        let roots = document.roots().to_vec();
+        let mut shown = Vec::new();
+        for node in roots {
+            let choice = Edit::SetVariant { node, variant: Some(variant.to_owned()) };
+            let undo = document.apply(choice).ok();
+            shown.extend(glows(&document, node));
+            undo.map(|undo| document.apply(undo).unwrap());
+        }
+        assert_eq!(shown, expected, "{variant}");
+    }
+}

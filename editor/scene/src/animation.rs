@@ -4,6 +4,7 @@
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
+mod begin;
 mod property;
 
 pub(crate) use property::Animated;

@@ -285,6 +285,11 @@ impl<'a> Writer<'a> {
             let (mut object, extras) = writer.write(material);
             sources.put(&mut object, sources.material(id), extras, &mut self.used);
             list.push(Value::Object(object));
+            let color = material.base_color;
+            if color.max_element() > 1.0 || color.min_element() < 0.0 {
+                let reason = format!("its base colour {color} is held to 0 to 1, as glTF wants it");
+                self.warn(&format!("material \"{}\"", material.name), reason);
+            }
         }
         for name in std::mem::take(&mut textures.missing) {
             self.warn(&format!("texture \"{name}\""), "its image is missing and is left out");

@@ -22,8 +22,8 @@ mod uri;
 mod watched;
 
 pub use environment::load_environment;
-pub(crate) use error::plain;
 pub use error::{ImportError, Warning};
+pub(crate) use error::{counted, plain, short};
 pub use shapes::load_shapes;
 pub(crate) use uri::{Location, is_address, leads_out, resolve};
 

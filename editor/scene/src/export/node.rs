@@ -113,9 +113,14 @@ impl NodeWriter<'_> {
     fn carried(&mut self, target: Target, mut object: Object, is_light: bool) -> usize {
         let kept = if is_light { self.sources.light(target) } else { self.sources.camera(target) };
         let extras = object.remove("extras");
-        let own_extras = extras.and_then(|extras| extras.as_object().cloned()).unwrap_or_default();
+        let mut own_extras = extras.and_then(|extras| extras.as_object().cloned()).unwrap_or_default();
         if let Some((_, kept)) = kept {
             object.put_text("name", &kept.name);
+            // What another program means by the word stays as long as there is nothing to say: it is read as nothing.
+            let theirs = kept.unknown.extras.as_ref().and_then(Value::as_object);
+            own_extras.retain(|key, value| {
+                value.as_f64() != Some(0.0) || theirs.is_none_or(|theirs| !theirs.contains_key(key))
+            });
         }
         let unknown = kept.map(|(prefab, kept)| (prefab, &kept.unknown));
         self.sources.put(&mut object, unknown, own_extras, self.used);
@@ -265,7 +270,8 @@ fn light_of(light: &Light, always: bool) -> Object {
             // The inner angle has to be less than the outer one.
             let inner_rad = if inner_rad < outer_rad { inner_rad } else { outer_rad.next_down().max(0.0) };
             spot.put("innerConeAngle", number(inner_rad));
-            spot.put("outerConeAngle", number(outer_rad));
+            // The nearest single to a right angle is a little more than one.
+            spot.put("outerConeAngle", at_most(outer_rad, std::f64::consts::FRAC_PI_2));
             object.put("spot", spot);
         }
         LightKind::Directional { angular_radius_rad } => {
@@ -274,6 +280,11 @@ fn light_of(light: &Light, always: bool) -> Object {
         }
     }
     object
+}
+
+/// A number as written, and no more than `most`, which is read back as the same single.
+fn at_most(value: f32, most: f64) -> Value {
+    if f64::from(value) > most { Value::from(most) } else { number(value) }
 }
 
 fn put_some(object: &mut Object, key: &str, value: Option<f32>) {

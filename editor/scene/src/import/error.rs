@@ -3,16 +3,38 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Text that may come from a file: control characters in it, which a terminal would obey, as escapes.
+/// Characters that turn the direction of what follows, so that a name reads as another.
+fn turns_text(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// Text that may come from a file: control characters in it, which a terminal would obey, as escapes; likewise those that
+/// turn the direction of text, and those that end a line.
 pub(crate) fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for c in text.chars() {
-        match c.is_control() {
+        match c.is_control() || turns_text(c) || matches!(c, '\u{2028}' | '\u{2029}') {
             true => plain.extend(c.escape_default()),
             false => plain.push(c),
         }
     }
     plain
+}
+
+/// Most characters of a name that a message shows.
+const MAX_SHOWN: usize = 80;
+
+/// A name or address of a file for a message: what is long is cut.
+pub(crate) fn short(text: &str) -> String {
+    match text.char_indices().nth(MAX_SHOWN) {
+        Some(_) => text.chars().take(MAX_SHOWN - 1).chain(['\u{2026}']).collect(),
+        None => text.to_owned(),
+    }
+}
+
+/// A count with its word, in the singular for one.
+pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// Why a file cannot be imported.

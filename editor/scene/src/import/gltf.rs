@@ -2,7 +2,7 @@
 //! In: a path. Out: [`Imported`]. The JSON is read by our own checked reader: node transforms stay in double
 //! precision, errors name a JSON pointer, and nothing is indexed before it was checked.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,9 +15,11 @@ mod accessor;
 mod animation;
 mod attributes;
 pub(super) mod buffers;
+mod carried;
 mod check;
 mod compressed;
 mod container;
+mod extras;
 mod foreign;
 mod json;
 mod loose;
@@ -95,7 +97,9 @@ fn read(
         .chain(tree.warnings)
         .chain(surroundings)
         .chain(image_warnings);
+    let mut said = HashSet::new();
     let warnings: Vec<Warning> = faults
+        .filter(|fault| said.insert((fault.place.clone(), fault.reason.clone())))
         .map(|fault| Warning { file: path.to_owned(), place: fault.place, message: fault.reason })
         .collect();
     prefab.foreign = Arc::new(foreign);

@@ -143,15 +143,26 @@ fn shared_models_come_back_the_same() {
     assert!(compared > 40, "{compared} models were compared");
 }
 
-/// Needs node and the validator: `npm install --prefix FOLDER gltf-validator`, then `NODE_PATH=FOLDER/node_modules`.
-#[test]
-fn the_khronos_validator_finds_no_error() {
-    let Some(models) = models() else { return };
+/// What the Khronos validator says about files, or `None` with a note. Needs node and the validator:
+/// `npm install --prefix FOLDER gltf-validator`, then `NODE_PATH=FOLDER/node_modules`.
+pub fn validated(files: &[PathBuf]) -> Option<String> {
     let there = Command::new("node").args(["-e", "require('gltf-validator')"]).output();
     if !there.is_ok_and(|output| output.status.success()) {
         println!("skipped: node does not find the package gltf-validator");
-        return;
+        return None;
     }
+    let output =
+        Command::new("node").args(["-e", include_str!("validate.js"), "--"]).args(files).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("{text}");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(text.lines().filter(|line| line.starts_with("looked at: ")).count(), files.len());
+    Some(text)
+}
+
+#[test]
+fn the_khronos_validator_finds_no_error() {
+    let Some(models) = models() else { return };
     let folder = tempfile::tempdir().unwrap();
     let export_one = |(number, model): (usize, &PathBuf)| {
         let name = format!("{number}-{}", name_of(number, model));
@@ -161,11 +172,6 @@ fn the_khronos_validator_finds_no_error() {
     for (number, document) in samples(folder.path()).iter().enumerate() {
         files.push(exported(document, folder.path(), &format!("sample-{number}.glb")).0);
     }
-    let output =
-        Command::new("node").args(["-e", include_str!("validate.js"), "--"]).args(&files).output().unwrap();
-    let text = String::from_utf8_lossy(&output.stdout);
-    println!("{text}");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert_eq!(text.lines().filter(|line| line.starts_with("looked at: ")).count(), files.len());
+    let Some(text) = validated(&files) else { return };
     assert!(!text.contains("error: "), "{text}");
 }

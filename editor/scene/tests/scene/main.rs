@@ -9,6 +9,7 @@
 
 mod animation;
 mod animation_pointer;
+mod bad_values;
 mod changes;
 mod common;
 mod compressed;

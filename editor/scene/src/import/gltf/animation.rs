@@ -77,18 +77,28 @@ impl Reader<'_> {
             match self.read_channel(sampler, &target)? {
                 // Nothing in the scene has what it changes.
                 Ok(read) if read.is_empty() => match self.unplayed(sampler, &target)? {
-                    Some(unplayed) => kept.push(unplayed),
+                    Some(unplayed) => {
+                        warnings.extend(begins_early(&channel, &unplayed));
+                        kept.push(unplayed);
+                    }
                     None => {
                         lost.push(format!("a channel of the clip \"{}\" that moves nothing", item.name()?))
                     }
                 },
                 Ok(read) => {
-                    for read in read {
+                    for mut read in read {
                         if !seen.insert((read.part, read.path)) {
                             warnings.push(channel.fault("another channel moves the same; it was left out"));
                             continue;
                         }
                         self.warn_about(&channel, &read, warnings);
+                        let first_s = read.times_s.first().copied().filter(|first_s| *first_s < 0.0);
+                        if let Some(first_s) = first_s {
+                            read.begin_at_zero();
+                            let reason =
+                                format!("its times begin at {first_s} s; what is before 0 is left out");
+                            warnings.push(channel.fault(reason));
+                        }
                         channels.push(read);
                     }
                 }
@@ -97,6 +107,7 @@ impl Reader<'_> {
                     let what =
                         if unplayed.is_some() { "it is only kept for exports" } else { "it was left out" };
                     warnings.push(channel.fault(format!("{reason}; {what}")));
+                    warnings.extend(unplayed.iter().filter_map(|unplayed| begins_early(&channel, unplayed)));
                     kept.extend(unplayed);
                 }
             }
@@ -251,6 +262,14 @@ impl Reader<'_> {
             false => Err(format!("a value in accessor {index} is not finite")),
         })
     }
+}
+
+/// A warning where what is only kept for exports begins before 0.
+fn begins_early(item: &Item<'_>, unplayed: &KeptChannel) -> Option<Fault> {
+    let first = unplayed.input.bytes.first_chunk::<4>().filter(|_| unplayed.input.component == 5126)?;
+    let first_s = f32::from_le_bytes(*first);
+    let reason = format!("its times begin at {first_s} s, before 0; exports have them as they stand");
+    (first_s < 0.0).then(|| item.fault(reason))
 }
 
 /// Whether there is a value of `width` numbers for each time, and rotations have a direction.

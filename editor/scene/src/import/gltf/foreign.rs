@@ -6,12 +6,15 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
+use super::carried::{read_camera, read_light};
 use super::check;
+use super::extras;
 use super::json::{Fault, Item};
+use super::material::names_mode;
 use super::mesh::Meshes;
-use super::node::{Tree, read_camera};
-use super::surroundings::is_ours;
+use super::node::Tree;
 use crate::foreign::{Foreign, Kept, KeptSkin, Unknown};
+use crate::prefab::SourceScene;
 
 /// Extensions that hold indices of nodes, meshes, images, accessors or buffer views.
 const POINTING: &[&str] = &[
@@ -58,7 +61,8 @@ pub(super) fn read(
         foreign.copyright = asset.text("copyright")?.map(str::to_owned);
         foreign.asset = unknown(&asset, &[]);
     }
-    foreign.scenes = root.objects("scenes")?.iter().map(of_scene).collect();
+    let scenes = root.objects("scenes")?;
+    foreign.scenes = scenes.iter().zip(&tree.scenes).map(|(item, scene)| of_scene(item, scene)).collect();
     foreign.scenes.resize(tree.scenes.len(), Unknown::default());
     for (node, item) in root.objects("nodes")?.iter().enumerate() {
         let part = tree.part_of_node.get(node).copied().flatten();
@@ -67,10 +71,12 @@ pub(super) fn read(
         }
     }
     for (mesh, item) in root.objects("meshes")?.iter().enumerate() {
-        foreign.meshes.extend(some_unknown(item, &["targetNames"]).map(|kept| (mesh, kept)));
+        foreign.meshes.extend(some_unknown(item, named_targets(item)).map(|kept| (mesh, kept)));
     }
     for (material, item) in root.objects("materials")?.iter().enumerate() {
-        let kept = some_unknown(item, &["volumePriority", "shadingMode"]);
+        let mut read = extras::numbers(item, &["volumePriority"]);
+        read.extend(names_mode(item).then_some("shadingMode"));
+        let kept = some_unknown(item, &read);
         foreign.materials.extend(kept.map(|kept| (material, kept)));
     }
     for (clip, item) in root.objects("animations")?.iter().enumerate() {
@@ -83,6 +89,7 @@ pub(super) fn read(
         foreign.skins.insert(place as usize, kept);
     }
     let (lights, cameras) = carried(root)?;
+    warn_about_spare(&lights, &cameras, tree);
     foreign.lights = kept_of(&tree.light_of, &lights)?;
     foreign.cameras = kept_of(&tree.camera_of, &cameras)?;
     let values = |items: &[Item<'_>], spare: &[usize]| {
@@ -108,9 +115,14 @@ pub(super) fn carried<'a>(root: &Item<'a>) -> Result<(Vec<Item<'a>>, Vec<Item<'a
     Ok((lights, root.objects("cameras")?))
 }
 
-fn of_scene(scene: &Item<'_>) -> Unknown {
-    let own = scene.get("extras").and_then(|extras| extras.get("environment"));
-    unknown(scene, if own.as_ref().is_some_and(is_ours) { &["environment"] } else { &[] })
+fn of_scene(item: &Item<'_>, scene: &SourceScene) -> Unknown {
+    unknown(item, if scene.environment.is_some() { &["environment"] } else { &[] })
+}
+
+/// Names of targets that a mesh has: an array.
+fn named_targets(mesh: &Item<'_>) -> &'static [&'static str] {
+    let names = mesh.get("extras").and_then(|extras| extras.raw("targetNames"));
+    if names.is_some_and(Value::is_array) { &["targetNames"] } else { &[] }
 }
 
 /// What is kept of the lights or cameras that parts carry. `carried`: by part.
@@ -120,7 +132,10 @@ fn kept_of(carried: &BTreeMap<u32, usize>, items: &[Item<'_>]) -> Result<BTreeMa
     for (&part, index) in carried {
         let Some((item, &number)) = items.get(*index).zip(numbers.get(index)) else { continue };
         let size = if item.text("type")? == Some("directional") { "angle" } else { "radius" };
-        kept.insert(part, Kept { number, name: item.name()?, unknown: unknown(item, &[size]) });
+        kept.insert(
+            part,
+            Kept { number, name: item.name()?, unknown: unknown(item, &extras::numbers(item, &[size])) },
+        );
     }
     Ok(kept)
 }
@@ -138,6 +153,22 @@ pub(super) fn spare_cameras(cameras: &[Item<'_>], tree: &Tree) -> Vec<usize> {
     let spare =
         cameras.iter().enumerate().filter(|(place, item)| !carried.contains_key(place) && usable(item));
     spare.map(|(place, _)| place).collect()
+}
+
+/// What is wrong with lights and cameras that no node carries: exports have them as they stand.
+fn warn_about_spare(lights: &[Item<'_>], cameras: &[Item<'_>], tree: &mut Tree) {
+    let mut found = Vec::new();
+    for light in spare_lights(lights, tree).into_iter().filter_map(|place| lights.get(place)) {
+        let read = read_light(light, None, &mut found);
+        found.extend(read.err());
+    }
+    for camera in spare_cameras(cameras, tree).into_iter().filter_map(|place| cameras.get(place)) {
+        let read = read_camera(camera, &mut found);
+        found.extend(read.err());
+    }
+    let said = "no node carries it, so that exports have it as it stands";
+    tree.warnings
+        .extend(found.into_iter().map(|fault| Fault::new(fault.place, format!("{}; {said}", fault.reason))));
 }
 
 /// The numbers that [`Kept`] gives to what parts carry, by place in the file.

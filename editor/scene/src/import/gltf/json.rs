@@ -285,6 +285,9 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
+/// What is not negative.
+pub(super) const POSITIVE: RangeInclusive<f32> = 0.0..=f32::MAX;
+
 /// A number within bounds; one that is not is held to them, with a warning that names the field.
 pub(super) fn held(
     item: &Item<'_>,

@@ -6,7 +6,8 @@ use std::ops::RangeInclusive;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::json::{Fault, Item, held};
+use super::extras;
+use super::json::{Fault, Item, POSITIVE, held};
 use super::texture::TextureTable;
 use crate::assets::{AlphaMode, MAX_RADIANCE, Material, ShadingMode, TextureUse};
 
@@ -17,8 +18,6 @@ pub(crate) const INFINITE_IOR: f32 = 1e6;
 
 /// Share of something.
 const UNIT: RangeInclusive<f32> = 0.0..=1.0;
-/// What is not negative.
-const POSITIVE: RangeInclusive<f32> = 0.0..=f32::MAX;
 
 /// Reads all materials. The textures of extensions are asked for after those of all materials: projects know textures
 /// by their order, and older versions asked for the others alone.
@@ -47,14 +46,14 @@ impl Reader<'_> {
     fn material(&mut self, item: &Item<'_>) -> Result<Material, Fault> {
         let mut material = Material {
             name: item.name()?,
-            emissive: Vec3::from(item.f32s_or("emissiveFactor", [0.0; 3])?).max(Vec3::ZERO),
+            emissive: self.emissive(item)?,
             emissive_texture: self.texture_use(item, "emissiveTexture", true)?,
-            alpha: read_alpha(item)?,
+            alpha: self.alpha(item)?,
             double_sided: item.bool_or("doubleSided", false)?,
             ..Material::default()
         };
         if let Some(pbr) = item.child("pbrMetallicRoughness")? {
-            material.base_color = Vec4::from(pbr.f32s_or("baseColorFactor", [1.0; 4])?).max(Vec4::ZERO);
+            material.base_color = self.base_color(&pbr, "baseColorFactor")?;
             material.base_color_texture = self.texture_use(&pbr, "baseColorTexture", true)?;
             material.metallic = self.within(&pbr, "metallicFactor", 1.0, UNIT)?;
             material.roughness = self.within(&pbr, "roughnessFactor", 1.0, UNIT)?;
@@ -94,10 +93,9 @@ impl Reader<'_> {
         if let Some(extension) = item.extension("KHR_materials_volume")? {
             self.volume(&extension, material)?;
         }
-        if let Some(extras) = item.get("extras")
-            && extras.get("volumePriority").is_some()
-        {
-            material.volume_priority = extras.f32_or("volumePriority", 0.0)?.clamp(0.0, 255.0) as u8;
+        if let Some(Some(priority)) = extras::number(item, "volumePriority", &mut self.warnings) {
+            let held = self.held(item, "extras/volumePriority", priority as f32, &(0.0..=255.0));
+            material.volume_priority = held as u8;
         }
         Ok(())
     }
@@ -109,10 +107,42 @@ impl Reader<'_> {
         material.attenuation_color = self.color(extension, "attenuationColor", Vec3::ONE, UNIT)?;
         // Absent means that nothing is attenuated; 0 and less are not allowed and read as absent.
         material.attenuation_distance_m = match extension.f64("attenuationDistance")? {
-            Some(distance) if distance > 0.0 && (distance as f32).is_finite() => Some(distance as f32),
-            _ => None,
+            Some(distance) if distance as f32 > 0.0 => Some(distance as f32).filter(|d| d.is_finite()),
+            Some(distance) => {
+                let place = format!("{}/attenuationDistance", extension.place());
+                let reason = format!("{distance} has to be above 0; nothing is attenuated");
+                self.warnings.push(Fault::new(place, reason));
+                None
+            }
+            None => None,
         };
         Ok(())
+    }
+
+    /// A base colour, with alpha.
+    fn base_color(&mut self, item: &Item<'_>, key: &str) -> Result<Vec4, Fault> {
+        let given = item.f32s_or(key, [1.0; 4])?;
+        Ok(Vec4::from(given.map(|channel| self.held(item, key, channel, &UNIT))))
+    }
+
+    /// What it emits. Channels above 1 are those of a stronger light, which exports write as
+    /// `KHR_materials_emissive_strength`.
+    fn emissive(&mut self, item: &Item<'_>) -> Result<Vec3, Fault> {
+        let emissive = self.color(item, "emissiveFactor", Vec3::ZERO, POSITIVE)?;
+        if emissive.max_element() > 1.0 {
+            let reason = format!("{emissive} has to be within 0 and 1; it is taken as a stronger light");
+            self.warnings.push(Fault::new(format!("{}/emissiveFactor", item.place()), reason));
+        }
+        Ok(emissive)
+    }
+
+    fn alpha(&mut self, item: &Item<'_>) -> Result<AlphaMode, Fault> {
+        Ok(match item.text("alphaMode")? {
+            None | Some("OPAQUE") => AlphaMode::Opaque,
+            Some("MASK") => AlphaMode::Mask { cutoff: self.within(item, "alphaCutoff", 0.5, POSITIVE)? },
+            Some("BLEND") => AlphaMode::Blend,
+            Some(other) => return Err(item.fault(format!("alphaMode {other} does not exist"))),
+        })
     }
 
     /// A number held to its range, with a warning where that changes it.
@@ -176,15 +206,6 @@ impl Reader<'_> {
     }
 }
 
-fn read_alpha(item: &Item<'_>) -> Result<AlphaMode, Fault> {
-    Ok(match item.text("alphaMode")? {
-        None | Some("OPAQUE") => AlphaMode::Opaque,
-        Some("MASK") => AlphaMode::Mask { cutoff: item.f32_or("alphaCutoff", 0.5)? },
-        Some("BLEND") => AlphaMode::Blend,
-        Some(other) => return Err(item.fault(format!("alphaMode {other} does not exist"))),
-    })
-}
-
 /// What `extras.shadingMode` of an exported material says where the rest would be read as another mode.
 fn mode_of_name(name: &str) -> Option<ShadingMode> {
     [ShadingMode::Pbr, ShadingMode::Reflective, ShadingMode::Refractive]
@@ -208,12 +229,22 @@ pub(crate) fn is_smooth_glass(material: &Material) -> bool {
         && !material.has_scattering_lobe()
 }
 
+/// The mode that `extras` name.
+fn named_mode(item: &Item<'_>) -> Option<ShadingMode> {
+    let named = item.get("extras").and_then(|extras| extras.text("shadingMode").ok().flatten());
+    named.and_then(mode_of_name)
+}
+
+/// Whether they name one.
+pub(super) fn names_mode(item: &Item<'_>) -> bool {
+    named_mode(item).is_some()
+}
+
 /// Smooth glass is told by its values, the rest by name.
 fn shading_mode(item: &Item<'_>, material: &Material) -> Result<ShadingMode, Fault> {
-    let named = item.get("extras").and_then(|extras| extras.text("shadingMode").ok().flatten());
     Ok(if item.extension("KHR_materials_unlit")?.is_some() {
         ShadingMode::Unlit
-    } else if let Some(named) = named.and_then(mode_of_name) {
+    } else if let Some(named) = named_mode(item) {
         named
     } else if is_smooth_glass(material) {
         ShadingMode::Refractive

@@ -1,28 +1,24 @@
-//! The node tree with lights and cameras, in double precision.
+//! The node tree, in double precision.
 //! In: JSON. Out: parts in depth-first order, those of the default scene first. Deep trees are walked without recursion.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DMat4, DQuat, DVec3};
 
 use super::accessor::Accessors;
+use super::carried::{read_camera, read_light};
 use super::foreign::carried;
-use super::json::{Fault, Item, held};
+use super::json::{Fault, Item};
 use super::mesh::{Meshes, read_weights};
-use crate::assets::{Camera, Light, LightKind, Mesh, Projection};
+use crate::assets::{Light, Mesh};
 use crate::foreign::LooseMesh;
 use crate::ids::MeshId;
+use crate::import::counted;
 use crate::prefab::{PartNode, SourceScene};
 use crate::transform::{Local, Trs};
 
-/// Radius of point and spot lights whose file gives none, metres: hard shadows, as other programs show them.
-const DEFAULT_LIGHT_RADIUS_M: f64 = 0.0;
-/// Full angle of directional lights whose file gives none, degrees: hard shadows likewise.
-const DEFAULT_SUN_ANGLE_DEG: f64 = 0.0;
 /// Most parts that one file may bring, GPU instances counted.
 const MAX_PARTS: usize = 4_000_000;
-/// Nearest distance drawn by cameras whose file gives none that can be used, metres.
-const DEFAULT_NEAR_M: f32 = 0.01;
 /// A rotation this close to unit length is left as it is, bit for bit.
 const UNIT_TOLERANCE: f64 = 1e-14;
 
@@ -205,7 +201,7 @@ impl Reader<'_> {
         let instances = match (mesh, item.extension("EXT_mesh_gpu_instancing")?) {
             (Some(_), Some(extension)) => {
                 tree.lost.extend(lost_attributes(&extension)?);
-                self.read_instances(&extension)?
+                self.read_instances(&extension, &mut tree.warnings)?
             }
             _ => None,
         };
@@ -252,10 +248,14 @@ impl Reader<'_> {
         };
         let index = extension.required_index("light", self.lights.len(), "light")?;
         tree.light_of.insert(part, index);
-        self.lights.get(index).map(|light| read_light(light, item, &mut tree.warnings)).transpose()
+        self.lights.get(index).map(|light| read_light(light, Some(item), &mut tree.warnings)).transpose()
     }
 
-    fn read_instances(&self, extension: &Item<'_>) -> Result<Option<Vec<Trs>>, Fault> {
+    fn read_instances(
+        &self,
+        extension: &Item<'_>,
+        warnings: &mut Vec<Fault>,
+    ) -> Result<Option<Vec<Trs>>, Fault> {
         let Some(attributes) = extension.child("attributes")? else {
             return Ok(None);
         };
@@ -288,14 +288,31 @@ impl Reader<'_> {
             value.filter(|v| v.iter().all(|v| v.is_finite()))
         };
         let vector = |[x, y, z, _]: [f32; 4]| DVec3::new(x.into(), y.into(), z.into());
-        let instance = |i| Trs {
+        let mut unusable: BTreeMap<&str, usize> = BTreeMap::new();
+        for (name, list) in [("TRANSLATION", &translations), ("ROTATION", &rotations), ("SCALE", &scales)] {
+            let bad = (0..count).filter(|&i| list.is_some() && at(list, i).is_none());
+            unusable.insert(name, bad.count());
+        }
+        let mut instance = |i| Trs {
             translation: at(&translations, i).map_or(DVec3::ZERO, vector),
             rotation: at(&rotations, i).map_or(DQuat::IDENTITY, |[x, y, z, w]| {
-                unit(DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into())).unwrap_or(DQuat::IDENTITY)
+                unit(DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into())).unwrap_or_else(|| {
+                    *unusable.entry("ROTATION").or_default() += 1;
+                    DQuat::IDENTITY
+                })
             }),
             scale: at(&scales, i).map_or(DVec3::ONE, vector),
         };
-        Ok(Some((0..count).map(instance).collect()))
+        let instances = (0..count).map(&mut instance).collect();
+        for (name, count) in unusable.into_iter().filter(|(_, count)| *count > 0) {
+            let place = format!("{}/{name}", attributes.place());
+            let what = if name == "ROTATION" { "of length 0 or not finite" } else { "not finite" };
+            warnings.push(Fault::new(
+                place,
+                format!("{} {what}: left out", counted(count, "value is", "values are")),
+            ));
+        }
+        Ok(Some(instances))
     }
 }
 
@@ -320,6 +337,12 @@ pub(crate) fn unit(rotation: DQuat) -> Option<DQuat> {
 fn read_local(item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Local, Fault> {
     if let Some(columns) = item.f64s::<16>("matrix")? {
         let matrix = DMat4::from_cols_array(&columns);
+        let also = ["translation", "rotation", "scale"].into_iter().filter(|key| item.raw(key).is_some());
+        let also: Vec<&str> = also.collect();
+        if !also.is_empty() {
+            warnings
+                .push(item.fault(format!("it has a matrix and {} too; the matrix counts", also.join(", "))));
+        }
         let row = matrix.row(3);
         if row.truncate() != DVec3::ZERO || row.w != 1.0 {
             warnings.push(item.fault("the last row of its matrix is not 0 0 0 1 and was ignored"));
@@ -340,108 +363,4 @@ fn read_local(item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Local, Fault
         trs.scale = scale.into();
     }
     Ok(Local::Trs(trs))
-}
-
-/// A number in `extras` of the light, else of the node that carries it.
-fn extra(light: &Item<'_>, node: &Item<'_>, key: &str, default: f64) -> Result<f64, Fault> {
-    for owner in [light, node] {
-        if let Some(extras) = owner.get("extras")
-            && extras.get(key).is_some()
-        {
-            extras.f32_or(key, 0.0)?;
-            return extras.f64(key).map(|value| value.unwrap_or(default).max(0.0));
-        }
-    }
-    Ok(default)
-}
-
-/// KHR_lights_punctual, with `radius` (metres) or `angle` (full angle in degrees) from `extras`.
-fn read_light(item: &Item<'_>, node: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Light, Fault> {
-    let range_m = match item.f64("range")? {
-        Some(range) if range > 0.0 && (range as f32).is_finite() => Some(range as f32),
-        _ => None,
-    };
-    let radius = || extra(item, node, "radius", DEFAULT_LIGHT_RADIUS_M).map(|radius| radius as f32);
-    let kind = match item.text("type")? {
-        Some("point") => LightKind::Point { radius_m: radius()?, range_m },
-        Some("spot") => {
-            let (inner, outer) = match item.child("spot")? {
-                Some(spot) => (
-                    spot.f32_or("innerConeAngle", 0.0)?,
-                    spot.f32_or("outerConeAngle", std::f32::consts::FRAC_PI_4)?,
-                ),
-                None => (0.0, std::f32::consts::FRAC_PI_4),
-            };
-            let outer_rad =
-                held(item, "spot/outerConeAngle", outer, &(0.0..=std::f32::consts::FRAC_PI_2), warnings);
-            LightKind::Spot {
-                radius_m: radius()?,
-                range_m,
-                inner_rad: held(item, "spot/innerConeAngle", inner, &(0.0..=outer_rad), warnings),
-                outer_rad,
-            }
-        }
-        Some("directional") => {
-            let angle_deg = extra(item, node, "angle", DEFAULT_SUN_ANGLE_DEG)?;
-            if angle_deg > 180.0 {
-                let words = format!("a sun of {angle_deg} degrees; 180 are taken");
-                warnings.push(item.fault(words));
-            }
-            let angle_deg = angle_deg.min(180.0);
-            LightKind::Directional { angular_radius_rad: (angle_deg.to_radians() / 2.0) as f32 }
-        }
-        Some(other) => return Err(item.fault(format!("light type {other} does not exist"))),
-        None => return Err(item.fault("\"type\" is missing")),
-    };
-    Ok(Light {
-        color: Vec3::from(item.f32s_or("color", [1.0; 3])?).max(Vec3::ZERO),
-        intensity: held(item, "intensity", item.f32_or("intensity", 1.0)?, &(0.0..=f32::MAX), warnings),
-        kind,
-    })
-}
-
-/// A camera that cannot be used is left out with a warning.
-pub(super) fn read_camera(item: &Item<'_>, warnings: &mut Vec<Fault>) -> Result<Option<Camera>, Fault> {
-    let optional = |item: &Item<'_>, key: &str| {
-        item.f64(key).map(|v| v.map(|v| v as f32).filter(|v| v.is_finite() && *v > 0.0))
-    };
-    let (projection, lens) = match item.text("type")? {
-        Some("perspective") => {
-            let Some(lens) = item.child("perspective")? else {
-                return Err(item.fault("\"perspective\" is missing"));
-            };
-            let yfov_rad = lens.f32_or("yfov", 0.0)?;
-            (Projection::Perspective { yfov_rad }, lens)
-        }
-        Some("orthographic") => {
-            let Some(lens) = item.child("orthographic")? else {
-                return Err(item.fault("\"orthographic\" is missing"));
-            };
-            let ymag_m = lens.f32_or("ymag", 0.0)?.abs();
-            (Projection::Orthographic { ymag_m }, lens)
-        }
-        _ => return Err(item.fault("the camera is neither perspective nor orthographic")),
-    };
-    let usable = match projection {
-        Projection::Perspective { yfov_rad } => yfov_rad > 0.0 && yfov_rad < std::f32::consts::PI,
-        Projection::Orthographic { ymag_m } => ymag_m > 0.0,
-    };
-    if !usable {
-        warnings.push(item.fault("its angle or size is 0 or less, or too wide; it was left out"));
-        return Ok(None);
-    }
-    let aspect = match projection {
-        Projection::Perspective { .. } => optional(&lens, "aspectRatio")?,
-        Projection::Orthographic { ymag_m } => {
-            // In double precision, so that an export can give the width that leads to the same quotient.
-            let xmag = optional(&lens, "xmag")?.and(lens.f64("xmag")?);
-            xmag.map(|xmag| (xmag / f64::from(ymag_m)) as f32)
-        }
-    };
-    Ok(Some(Camera {
-        projection,
-        near_m: optional(&lens, "znear")?.unwrap_or(DEFAULT_NEAR_M),
-        far_m: optional(&lens, "zfar")?,
-        aspect,
-    }))
 }

@@ -1,9 +1,9 @@
 //! Extensions that add a lobe to a material. In: JSON. Out: the lobe, absent where the extension is.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 
-use super::super::json::{Fault, Item};
-use super::{POSITIVE, Reader, UNIT};
+use super::super::json::{Fault, Item, POSITIVE};
+use super::{Reader, UNIT};
 use crate::assets::{
     Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Material, Sheen, SpecularGlossiness,
 };
@@ -74,7 +74,7 @@ impl Reader<'_> {
 
     /// Takes the place of metallic-roughness, which such a file gives for programs that do not know the extension.
     fn specular_glossiness(&mut self, extension: &Item<'_>, material: &mut Material) -> Result<(), Fault> {
-        material.base_color = Vec4::from(extension.f32s_or("diffuseFactor", [1.0; 4])?).max(Vec4::ZERO);
+        material.base_color = self.base_color(extension, "diffuseFactor")?;
         material.base_color_texture = self.texture_use(extension, "diffuseTexture", true)?;
         material.metallic_roughness_texture = None;
         material.specular_glossiness = Some(SpecularGlossiness {

@@ -109,9 +109,8 @@ fn open(session: &mut Session, args: &RenderArgs, loaded: Loaded) -> anyhow::Res
         choose_variant(session, name).with_context(|| args.file.display().to_string())?;
     }
     if let Some(name) = &args.camera {
-        let known: Vec<String> =
-            session.document().cameras().map(|c| session.document().display_name(c.target)).collect();
         if session.document().find_camera(name).is_none() {
+            let known = session.document().camera_names();
             let known = if known.is_empty() { String::from("the file has none") } else { known.join(", ") };
             bail!("{}: no camera '{name}'; there is: {known}", args.file.display());
         }

@@ -9,6 +9,7 @@ use crate::assets::{Bounds, Camera, Light, Mesh, join, moved};
 use crate::changes::Content;
 use crate::ids::{MaterialId, MeshId, NodeId, Target};
 use crate::node::NodeKind;
+use crate::prefab::scenes::told_apart;
 
 /// A mesh that is placed.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,9 +88,17 @@ impl Document {
         self.targets_with(|content| content.camera).filter_map(|target| self.camera(target))
     }
 
-    /// The first camera of this name; parts of instances count.
+    /// Names of the cameras in the order of [`Self::cameras`], told apart as scenes and variants are: the n-th of one name is
+    /// `NAME#n`, one without a name `camera n`.
+    pub fn camera_names(&self) -> Vec<String> {
+        let name = |camera: Placed<Camera>| self.name(camera.target).unwrap_or_default().to_owned();
+        told_apart("camera", self.cameras().map(name).collect())
+    }
+
+    /// The camera of one of [`Self::camera_names`]; parts of instances count.
     pub fn find_camera(&self, name: &str) -> Option<Placed<Camera>> {
-        self.cameras().find(|camera| self.name(camera.target) == Some(name))
+        let place = self.camera_names().iter().position(|known| known == name)?;
+        self.cameras().nth(place)
     }
 
     /// The camera to render with: the chosen one, else the first.

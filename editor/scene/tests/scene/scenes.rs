@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use caustica_scene::{ClipChoice, Document, Edit, EditError, Environment, NodeId, Project, Target, audit};
+use caustica_scene::{
+    Camera, ClipChoice, Document, Edit, EditError, Environment, Node, NodeId, NodeKind, Project, Target,
+    audit,
+};
 use glam::Vec3;
 use serde_json::{Value, json};
 
@@ -172,7 +175,7 @@ fn scenes_that_are_left_out_are_counted() {
     let (path, done) = exported(&document, folder.path(), "moved.glb");
     let said: Vec<&str> = done.warnings.iter().map(|warning| warning.message.as_str()).collect();
     assert!(said[1].starts_with("2 scenes that are not shown are left out, with 4 nodes"), "{said:?}");
-    assert!(said[0].starts_with("1 channels are left out"), "{said:?}");
+    assert!(said[0].starts_with("1 channel is left out"), "{said:?}");
     let file = json_of(&path);
     assert_eq!((file["nodes"].as_array().unwrap().len(), file.get("animations")), (2, None));
     let again = placed(read(&path));
@@ -193,4 +196,21 @@ fn a_node_that_two_scenes_place_at_different_depths_is_said() {
     assert!(imported.warnings[0].message.contains("in two places"), "{:?}", imported.warnings);
     let document = placed(imported);
     assert_eq!(below(&document, document.roots()[0].into()), ["top"]);
+}
+
+#[test]
+fn cameras_of_one_name_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut document = crate::common::scene(folder.path()).document;
+    for name in ["Eye", ""] {
+        let (_, edit) = document.add_edit(Node::new(name, NodeKind::Camera(Camera::default())), None);
+        document.apply(edit).unwrap();
+    }
+    let names = document.camera_names();
+    assert_eq!(names, ["Plate", "Plate#2", "Eye", "Eye#2", "camera 5"]);
+    let targets: Vec<Target> = document.cameras().map(|camera| camera.target).collect();
+    for (name, target) in names.iter().zip(targets) {
+        assert_eq!(document.find_camera(name).map(|camera| camera.target), Some(target), "{name}");
+    }
+    assert!(document.find_camera("Plate#3").is_none() && document.find_camera("").is_none());
 }

@@ -6,11 +6,13 @@ use std::collections::BTreeMap;
 use glam::DAffine3;
 
 use crate::animation::ClipChoice;
-use crate::assets::{AlphaMode, Material, Mesh, ShapeSource};
+use crate::assets::{AlphaMode, Environment, Material, Mesh, ShapeSource};
 use crate::document::Document;
-use crate::ids::{MaterialId, MeshId, Target, TextureId};
+use crate::ids::{MaterialId, MeshId, NodeId, Target, TextureId};
+use crate::import::counted;
 use crate::import::geometry::has_no_area;
 use crate::node::NodeKind;
+use crate::prefab::{PartOverride, PartPath, Prefab};
 use crate::transform::is_degenerate;
 
 mod finding;
@@ -91,6 +93,7 @@ impl Audit<'_> {
             }
             let lost = overrides.keys().filter(|path| prefab.part_at(path).is_none());
             let lost: Vec<&str> = lost.map(|path| path.0.as_str()).collect();
+            self.lost_primitives(id, &node.name, prefab, overrides);
             if !lost.is_empty() {
                 let subject = Subject::Target(Target::node(id));
                 let message = format!(
@@ -98,6 +101,32 @@ impl Audit<'_> {
                     lost.join(", ")
                 );
                 self.add(Severity::Warning, subject, &node.name, message);
+            }
+        }
+    }
+
+    /// Materials of primitives that the meshes of an instance do not have.
+    fn lost_primitives(
+        &mut self,
+        id: NodeId,
+        name: &str,
+        prefab: &Prefab,
+        overrides: &BTreeMap<PartPath, PartOverride>,
+    ) {
+        for (path, own) in overrides.iter().filter(|(_, own)| !own.materials.is_empty()) {
+            let Some(part) = prefab.part_at(path).and_then(|part| prefab.node(part)) else { continue };
+            let mesh = part.mesh.and_then(|mesh| self.document.mesh(mesh));
+            let count = mesh.map_or(0, |mesh| mesh.primitives.len());
+            let lost = own.materials.keys().filter(|&&primitive| primitive as usize >= count);
+            let lost: Vec<String> = lost.map(u32::to_string).collect();
+            if !lost.is_empty() {
+                let has = counted(count, "primitive", "primitives");
+                let message = format!(
+                    "it gives materials to primitives {} of {}, whose mesh has {has}; they are kept aside",
+                    lost.join(", "),
+                    path.0
+                );
+                self.add(Severity::Warning, Subject::Target(Target::node(id)), name, message);
             }
         }
     }
@@ -159,14 +188,16 @@ impl Audit<'_> {
     fn mesh(&mut self, id: MeshId, mesh: &Mesh) {
         let data = &mesh.data;
         let subject = Subject::Mesh(id);
-        let finite = |bad: usize, what: &str| (bad > 0).then(|| format!("{bad} {what} are not finite"));
+        let finite = |bad: usize, one: &str, many: &str| {
+            (bad > 0).then(|| format!("{} not finite", counted(bad, one, many)))
+        };
         let bad_positions = data.positions.iter().filter(|p| !p.is_finite()).count();
         let bad_normals = data.normals.iter().filter(|n| !n.is_finite()).count();
         let bad_tangents = data.tangents.iter().filter(|t| !t.is_finite()).count();
         for message in [
-            finite(bad_positions, "positions"),
-            finite(bad_normals, "normals"),
-            finite(bad_tangents, "tangents"),
+            finite(bad_positions, "position is", "positions are"),
+            finite(bad_normals, "normal is", "normals are"),
+            finite(bad_tangents, "tangent is", "tangents are"),
         ]
         .into_iter()
         .flatten()
@@ -190,11 +221,14 @@ impl Audit<'_> {
             }
         }
         if degenerate > 0 {
-            let message = format!("{degenerate} triangles have no area");
+            let message = format!("{} no area", counted(degenerate, "triangle has", "triangles have"));
             self.add(Severity::Warning, subject, &mesh.name, message);
         }
         if outside > 0 {
-            let message = format!("{outside} triangles name vertices that do not exist");
+            let message = format!(
+                "{} vertices that do not exist",
+                counted(outside, "triangle names", "triangles name")
+            );
             self.add(Severity::Error, subject, &mesh.name, message);
         }
     }
@@ -213,7 +247,10 @@ impl Audit<'_> {
         }
         let points = shapes.list().iter().filter(|shape| shape.half_extent.min_element() <= 0.0).count();
         if points > 0 {
-            let message = format!("{points} spheres or boxes have no size and are not seen");
+            let message = format!(
+                "{} not seen",
+                counted(points, "sphere or box has no size and is", "spheres or boxes have no size and are")
+            );
             self.add(Severity::Warning, subject, &mesh.name, message);
         }
     }
@@ -264,7 +301,7 @@ impl Audit<'_> {
         let missing = |id: &TextureId| self.document.texture(*id).is_none();
         let lost = material.textures().filter(|u| missing(&u.texture)).count();
         if lost > 0 {
-            let message = format!("{lost} of its textures are missing");
+            let message = format!("{} missing", counted(lost, "of its textures is", "of its textures are"));
             self.add(Severity::Error, subject, &material.name, message);
         }
     }
@@ -277,6 +314,15 @@ impl Audit<'_> {
     }
 
     fn scene(&mut self) {
+        if let Environment::File(file) = self.document.environment()
+            && file.map.is_none()
+        {
+            let message = format!(
+                "{} could not be read and the surroundings are black; put the file back or choose others",
+                file.path.display()
+            );
+            self.add(Severity::Error, Subject::Scene, "environment", message);
+        }
         if self.document.renderables().next().is_none() {
             let message = "there is nothing to see: no mesh is placed".to_owned();
             self.add(Severity::Info, Subject::Scene, "scene", message);
@@ -374,7 +420,7 @@ mod tests {
         let stretched = with_triangle(DVec3::new(1e6, 1.0, 1.0), Vec3::Y);
         assert!(messages(&stretched)[0].contains("1000000 to 1"));
         let nan = with_triangle(DVec3::ONE, Vec3::NAN);
-        assert!(messages(&nan)[0].contains("1 positions are not finite"));
+        assert!(messages(&nan)[0].contains("1 position is not finite"));
         let line = with_triangle(DVec3::ONE, Vec3::X * 2.0);
         assert!(messages(&line)[0].contains("no area"));
     }

@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::assets::{Environment, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId};
-use crate::import::{Warning, plain};
+use crate::import::{Warning, counted, plain};
 
 mod animation;
 mod buffer;
@@ -359,8 +359,14 @@ impl<'a> Writer<'a> {
             let Some(shapes) = self.document.mesh(id).and_then(|mesh| mesh.shapes()) else { continue };
             let (count, most) = (shapes.list().len(), shapes::MOST_TESSELLATED);
             let what = match meshes.get(id) {
-                Some(_) => format!("{count} spheres and boxes are written as triangles"),
-                None => format!("{count} spheres and boxes are left out, up to {most} become triangles"),
+                Some(_) => format!(
+                    "{} written as triangles",
+                    counted(count, "sphere or box is", "spheres and boxes are")
+                ),
+                None => format!(
+                    "{} left out, up to {most} become triangles",
+                    counted(count, "sphere or box is", "spheres and boxes are")
+                ),
             };
             self.warn(&format!("node \"{}\"", self.document.display_name(target)), what);
         }
@@ -381,8 +387,12 @@ impl<'a> Writer<'a> {
             self.warn("animations", "which clips are played is left out: all are written, in order");
         }
         if left_out > 0 {
-            let reason =
-                format!("{left_out} channels are left out, as they change nothing that is in the file");
+            let what = counted(
+                left_out,
+                "channel is left out, as it changes",
+                "channels are left out, as they change",
+            );
+            let reason = format!("{what} nothing that is in the file");
             self.warn("animations", reason);
         }
     }
@@ -398,7 +408,11 @@ impl<'a> Writer<'a> {
         }
         if self.used.homeless > 0 {
             let count = self.used.homeless;
-            let reason = format!("{count} extras or extensions are left out with the objects that have them");
+            let reason = counted(
+                count,
+                "extras or extension is left out with the object that has it",
+                "extras or extensions are left out with the objects that have them",
+            );
             self.warn("sources", reason);
         }
     }

@@ -23,7 +23,7 @@ mod watched;
 
 pub use environment::load_environment;
 pub use error::{ImportError, Warning};
-pub(crate) use error::{counted, plain, short};
+pub(crate) use error::{UTF16, counted, is_utf16, plain, short};
 pub use shapes::load_shapes;
 pub(crate) use uri::{Location, is_address, leads_out, resolve};
 

@@ -12,7 +12,7 @@ impl Channel {
         }
         let key = match self.times_s.get(before) {
             // There is one already.
-            Some(&time_s) if time_s == 0.0 => None,
+            Some(&0.0) => None,
             _ => self.key_at_zero(),
         };
         let per_key = self.width() * self.sets();

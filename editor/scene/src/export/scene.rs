@@ -14,6 +14,7 @@ use super::json::{self, Object, Put};
 use super::tree::Tree;
 use crate::assets::{Environment, EnvironmentFile};
 use crate::ids::{NodeId, PrefabId, Target};
+use crate::import::counted;
 use crate::prefab::SourceScene;
 
 impl Writer<'_> {
@@ -117,10 +118,14 @@ impl Writer<'_> {
                 (prefab.scenes().len().saturating_sub(shown.len()), parts.filter(is_nowhere).count());
             if scenes + parts > 0 {
                 let place = format!("source \"{}\"", prefab.source.display());
-                let reason = format!(
-                    "{scenes} scenes that are not shown are left out, with {parts} nodes that are in no other; a file that is \
-                     exported alone and unmoved keeps them"
+                let scenes = counted(
+                    scenes,
+                    "scene that is not shown is left out",
+                    "scenes that are not shown are left out",
                 );
+                let parts = counted(parts, "node that is in no other", "nodes that are in no other");
+                let reason =
+                    format!("{scenes}, with {parts}; a file that is exported alone and unmoved keeps them");
                 self.warn(&place, reason);
             }
         }

@@ -62,6 +62,7 @@ fn orthogonal_columns(matrix: DMat3) -> (DMat3, DMat3) {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use glam::DVec3;
 

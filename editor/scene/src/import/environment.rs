@@ -7,7 +7,7 @@ use std::path::Path;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, Rgb32FImage};
 
 use super::watched::Watched;
-use super::{ImportError, Warning, image_guard};
+use super::{ImportError, Warning, counted, image_guard};
 use crate::assets::RadianceMap;
 
 /// Widest and highest map that is read.
@@ -46,7 +46,14 @@ pub(super) fn of_bytes(bytes: &[u8], path: &Path) -> Result<(RadianceMap, Vec<Wa
         warnings.push(Warning {
             file: path.to_owned(),
             place: String::new(),
-            message: format!("{repaired} values were negative or not finite and are 0 now"),
+            message: format!(
+                "{} 0 now",
+                counted(
+                    repaired,
+                    "value was negative or not finite and is",
+                    "values were negative or not finite and are"
+                )
+            ),
         });
     }
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());

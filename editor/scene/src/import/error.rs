@@ -23,18 +23,35 @@ pub(crate) fn plain(text: &str) -> String {
 
 /// Most characters of a name that a message shows.
 const MAX_SHOWN: usize = 80;
+/// How many of them are its last.
+const SHOWN_AT_END: usize = 30;
 
-/// A name or address of a file for a message: what is long is cut.
+/// A name or address of a file for a message: of a long one the beginning and the end.
 pub(crate) fn short(text: &str) -> String {
-    match text.char_indices().nth(MAX_SHOWN) {
-        Some(_) => text.chars().take(MAX_SHOWN - 1).chain(['\u{2026}']).collect(),
-        None => text.to_owned(),
+    if text.chars().nth(MAX_SHOWN).is_none() {
+        return text.to_owned();
     }
+    let end: Vec<char> = text.chars().rev().take(SHOWN_AT_END).collect();
+    let begin = text.chars().take(MAX_SHOWN - SHOWN_AT_END - 1);
+    begin.chain(['\u{2026}']).chain(end.into_iter().rev()).collect()
 }
 
 /// A count with its word, in the singular for one.
 pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// What is said of files in the other encoding of Unicode.
+pub(crate) const UTF16: &str = "is text in UTF-16, which is not read; save it as UTF-8";
+
+/// Whether a text begins as UTF-16 does: with its mark, or with letters of which each has a zero beside it.
+pub(crate) fn is_utf16(bytes: &[u8]) -> bool {
+    let Some([a, b, c, d, e, f]) = bytes.first_chunk::<6>() else { return false };
+    let is_marked = [[*a, *b], [*b, *a]].contains(&[0xff, 0xfe]);
+    let (even, odd) = ([a, c, e], [b, d, f]);
+    let zero = |bytes: &[&u8; 3]| bytes.iter().all(|byte| **byte == 0);
+    let letters = |bytes: &[&u8; 3]| bytes.iter().all(|byte| **byte != 0);
+    is_marked || (zero(&even) && letters(&odd)) || (letters(&even) && zero(&odd))
 }
 
 /// Why a file cannot be imported.
@@ -94,6 +111,32 @@ fn told(f: &mut fmt::Formatter<'_>, file: &Path, place: &str, what: &str) -> fmt
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_names_are_cut_in_the_middle() {
+        let exact = "\u{e9}".repeat(MAX_SHOWN);
+        assert_eq!(short(&exact), exact);
+        let long = format!("{exact}.png");
+        let cut = short(&long);
+        assert!(
+            cut.chars().count() == MAX_SHOWN && cut.contains("\u{e9}\u{2026}\u{e9}") && cut.ends_with(".png")
+        );
+    }
+
+    #[test]
+    fn text_that_turns_around_is_shown_as_escapes() {
+        assert_eq!(
+            plain("a\u{202e}gpj.exe\u{2066}\u{200f}\u{2028}"),
+            "a\\u{202e}gpj.exe\\u{2066}\\u{200f}\\u{2028}"
+        );
+        // What joins letters of some scripts stays.
+        assert_eq!(plain("\u{200d}\u{5d0}"), "\u{200d}\u{5d0}");
+    }
+
+    #[test]
+    fn one_is_singular() {
+        assert_eq!([counted(1, "node", "nodes"), counted(0, "node", "nodes")], ["1 node", "0 nodes"]);
+    }
 
     #[test]
     fn no_control_character_of_a_file_is_shown() {

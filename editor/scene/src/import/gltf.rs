@@ -6,7 +6,7 @@ use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{ImportError, ImportOptions, Imported, Warning, file_stem, read_model_file};
+use super::{ImportError, ImportOptions, Imported, Warning, file_stem, read_model_file, short};
 use crate::assets::Material;
 use crate::foreign::Foreign;
 use crate::prefab::Prefab;
@@ -112,7 +112,7 @@ fn left_out_warnings(extensions: &[String], foreign: &Foreign) -> Vec<Fault> {
     let kept: BTreeSet<&String> = foreign.all().flat_map(|object| object.extension_names()).collect();
     let warning = |name: &String| {
         let what = if kept.contains(name) { "is only kept for exports" } else { "is left out" };
-        Fault::new("/extensionsUsed", format!("{name} is not supported and {what}"))
+        Fault::new("/extensionsUsed", format!("{} is not supported and {what}", short(name)))
     };
     extensions.iter().map(warning).collect()
 }

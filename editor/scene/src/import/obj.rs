@@ -11,7 +11,10 @@ use tobj::{LoadOptions, Model};
 
 use super::geometry::{Attributes, MeshBuilder, PrimitiveInput};
 use super::gltf::buffers::read_file;
-use super::{ImportError, ImportOptions, Imported, Warning, file_stem, read_model_file, uri};
+use super::{
+    ImportError, ImportOptions, Imported, UTF16, Warning, counted, file_stem, is_utf16, read_model_file,
+    short, uri,
+};
 use crate::assets::{Material, Mesh};
 use crate::ids::{MaterialId, MeshId};
 use crate::prefab::{PartNode, Prefab};
@@ -52,30 +55,30 @@ pub(super) fn load(
     progress: &dyn Fn(&str, f32),
 ) -> Result<Imported, ImportError> {
     let bytes = read_model_file(path)?;
+    if is_utf16(&bytes) {
+        return Err(ImportError::new(path, UTF16));
+    }
     let Tidy { text, smooth, materials: used, short_faces, other_elements, calls } =
         lines::tidy(&lines::text_of(&bytes))
             .map_err(|(line, reason)| ImportError::new(path, reason).at(format!("line {line}")))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     progress("reading faces", 0.1);
     let warnings = Warnings::default();
-    for (count, what) in [
-        (short_faces, "faces of fewer than three corners"),
-        (other_elements, "points, lines, curves or surfaces"),
-        (calls, "calls of other files or programs"),
+    for (count, one, many) in [
+        (short_faces, "face of fewer than three corners was", "faces of fewer than three corners were"),
+        (other_elements, "point, line, curve or surface was", "points, lines, curves or surfaces were"),
+        (calls, "call of another file or program was", "calls of other files or programs were"),
     ] {
         if count > 0 {
-            warnings.add(path, "", format!("{count} {what} were left out"));
+            warnings.add(path, "", format!("{} left out", counted(count, one, many)));
         }
     }
     let libraries = Libraries { path, folder, warnings: &warnings, read: RefCell::default() };
     let (mut models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &OPTIONS, |name| Ok(libraries.open(name)))
         .map_err(|error| ImportError::new(path, error.to_string()))?;
     drop(text);
-    let fans: usize = models.iter_mut().map(|model| polygons::triangulate(&mut model.mesh)).sum();
-    if fans > 0 {
-        let message = format!("{fans} faces cross themselves and became fans, which may not cover them");
-        warnings.add(path, "", message);
-    }
+    let fans = models.iter_mut().map(|model| polygons::triangulate(&mut model.mesh)).sum();
+    warn_of_fans(fans, path, &warnings);
     progress("building meshes", 0.4);
     let sources = libraries.read.into_inner().materials;
     warn_of_unknown(&used, &sources, path, &warnings);
@@ -157,7 +160,10 @@ impl Libraries<'_> {
                 } else {
                     Vec::new()
                 };
-                Ok((bytes, file))
+                match is_utf16(&bytes) {
+                    true => Err(format!("{}: {UTF16}", file.display())),
+                    false => Ok((bytes, file)),
+                }
             });
             match text {
                 Ok((bytes, file)) => {
@@ -165,7 +171,7 @@ impl Libraries<'_> {
                 }
                 Err(reason) => {
                     let message = format!("{reason}; its materials are left out");
-                    self.warnings.add(self.path, format!("mtllib {name}"), message);
+                    self.warnings.add(self.path, format!("mtllib {}", short(name)), message);
                 }
             }
         }
@@ -177,10 +183,31 @@ impl Libraries<'_> {
     }
 }
 
+fn warn_of_fans(fans: polygons::Fans, path: &Path, warnings: &Warnings) {
+    let polygons::Fans { crossed, large } = fans;
+    if crossed > 0 {
+        let faces = counted(
+            crossed,
+            "face crosses itself and became a fan",
+            "faces cross themselves and became fans",
+        );
+        warnings.add(path, "", format!("{faces}, which may not cover what was meant"));
+    }
+    if large > 0 {
+        let faces = counted(large, "face has", "faces have");
+        let reason = format!("{faces} more than {} corners, too many to be clipped", polygons::MANY);
+        warnings.add(path, "", format!("{reason}: a fan each, which may not cover what was meant"));
+    }
+}
+
 fn warn_of_unknown(used: &BTreeSet<String>, sources: &[Source], path: &Path, warnings: &Warnings) {
     let known: BTreeSet<&str> = sources.iter().map(|source| source.name.as_str()).collect();
     for name in used.iter().filter(|name| !known.contains(name.as_str())) {
-        warnings.add(path, format!("usemtl {name}"), "there is no such material; a grey one stands in");
+        warnings.add(
+            path,
+            format!("usemtl {}", short(name)),
+            "there is no such material; a grey one stands in",
+        );
     }
 }
 
@@ -198,7 +225,10 @@ fn read_object(
         let attributes = read_attributes(mesh, smooth);
         let count = attributes.positions.len();
         if let Some(bad) = mesh.indices.iter().find(|&&i| i as usize >= count) {
-            return Err(format!("object {name}: vertex index {bad} is out of range, there are {count}"));
+            return Err(format!(
+                "object {}: vertex index {bad} is out of range, there are {count}",
+                short(name)
+            ));
         }
         let material = mesh.material_id.filter(|&id| id < default_material).unwrap_or(default_material);
         let input = PrimitiveInput {
@@ -210,14 +240,23 @@ fn read_object(
                 .and_then(|material| material.normal_texture)
                 .map(|texture| texture.tex_coord),
         };
-        builder.add(input).map_err(|_| format!("object {name} has more vertices than 32 bits can count"))?;
+        builder
+            .add(input)
+            .map_err(|_| format!("object {} has more vertices than 32 bits can count", short(name)))?;
     }
     let repairs = builder.repairs;
     let removed = repairs.degenerate_triangles + repairs.non_finite_triangles;
     if removed > 0 {
         warn(
-            format!("object {name}"),
-            format!("{removed} triangles without area or with positions that are not finite were removed"),
+            format!("object {}", short(name)),
+            format!(
+                "{} removed",
+                counted(
+                    removed,
+                    "triangle without area or with positions that are not finite was",
+                    "triangles without area or with positions that are not finite were"
+                )
+            ),
         );
     }
     Ok(builder.finish(name.to_owned()))

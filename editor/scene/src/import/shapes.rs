@@ -1,13 +1,13 @@
 //! Spheres and boxes from a text file (`.xyz`, `.csv`, `.txt`). One shape a line, numbers parted by blanks, tabs, commas or
 //! semicolons: `x y z r` is a sphere, `x y z hx hy hz` a box with half extents. `#` begins a remark; a first line without
-//! any number is a head. Metres. Out: the shapes in the order of the file, or an error that names the line.
+//! any number is a head that names the columns. Metres. Out: the shapes in the order of the file, or an error that names the line.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::ImportError;
+use super::{ImportError, UTF16, is_utf16, short};
 use crate::assets::{MOST_SHAPES, Shape, ShapeFile};
 
 /// Reads a file of spheres and boxes.
@@ -16,6 +16,9 @@ use crate::assets::{MOST_SHAPES, Shape, ShapeFile};
 /// With file, line and reason when it cannot be read, a line holds something else, or there are too many.
 pub fn load_shapes(path: &Path) -> Result<ShapeFile, ImportError> {
     let bytes = super::read_model_file(path)?;
+    if is_utf16(&bytes) {
+        return Err(ImportError::new(path, UTF16));
+    }
     let text = std::str::from_utf8(&bytes).map_err(|error| {
         let line = bytes.iter().take(error.valid_up_to()).filter(|byte| **byte == b'\n').count() + 1;
         ImportError::new(path, "is no text in UTF-8").at(format!("line {line}"))
@@ -31,7 +34,9 @@ pub fn load_shapes(path: &Path) -> Result<ShapeFile, ImportError> {
 fn parse(text: &str) -> Result<Vec<Shape>, (usize, String)> {
     let mut shapes = Vec::new();
     let mut begun = false;
-    for (index, line) in text.lines().enumerate() {
+    let mut head: Option<Head> = None;
+    // Tables of some programs begin with a byte order mark.
+    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let content = line.split('#').next().unwrap_or_default();
         let words: Vec<&str> = content
             .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
@@ -42,14 +47,63 @@ fn parse(text: &str) -> Result<Vec<Shape>, (usize, String)> {
         }
         let is_head = !begun && words.iter().all(|word| word.parse::<f32>().is_err());
         begun = true;
-        if !is_head {
-            shapes.push(shape(&words).map_err(|reason| (index + 1, reason))?);
+        let fault = |reason| (index + 1, reason);
+        if is_head {
+            head = Some(Head::read(&words).map_err(fault)?);
+            continue;
         }
+        let in_order = match &head {
+            Some(head) => head.in_order(&words),
+            None => Ok(words),
+        };
+        shapes.push(in_order.and_then(|words| shape(&words)).map_err(fault)?);
         if shapes.len() > MOST_SHAPES as usize {
             return Err((index + 1, format!("there are more than {MOST_SHAPES} shapes")));
         }
     }
     Ok(shapes)
+}
+
+/// What the columns of a table are called, in the order in which shapes have them.
+const COLUMNS: [&[&str]; 2] = [&["x", "y", "z", "r"], &["x", "y", "z", "hx", "hy", "hz"]];
+
+/// A first line that names columns: for each number of a shape, its place in a line.
+struct Head {
+    places: Vec<usize>,
+}
+
+impl Head {
+    fn read(words: &[&str]) -> Result<Self, String> {
+        let bare = |word: &&str| word.trim_matches(['"', '\'']).to_ascii_lowercase();
+        let names: Vec<String> = words.iter().map(bare).collect();
+        let names: Vec<&str> =
+            names.iter().map(|name| if name == "radius" { "r" } else { name.as_str() }).collect();
+        let expected = "columns are x, y, z and r (or radius) of spheres, x, y, z, hx, hy and hz of boxes";
+        if let Some(unknown) = names.iter().find(|name| COLUMNS.iter().all(|known| !known.contains(name))) {
+            return Err(format!(
+                "there is no column \"{}\"; {expected}, and # begins a remark",
+                short(unknown)
+            ));
+        }
+        let place = |column: &&str| names.iter().position(|name| name == column);
+        let places = |columns: &&[&str]| columns.iter().map(place).collect::<Option<Vec<usize>>>();
+        let all = COLUMNS.iter().filter(|columns| columns.len() == names.len()).find_map(places);
+        let missing =
+            || format!("the columns {} are not those of a shape; {expected}", short(&names.join(", ")));
+        all.map(|places| Self { places }).ok_or_else(missing)
+    }
+
+    /// The words of a line as shapes have them.
+    fn in_order<'a>(&self, words: &[&'a str]) -> Result<Vec<&'a str>, String> {
+        if words.len() != self.places.len() {
+            return Err(format!(
+                "expected {} numbers, as the head names, found {}",
+                self.places.len(),
+                words.len()
+            ));
+        }
+        Ok(self.places.iter().filter_map(|&place| words.get(place).copied()).collect())
+    }
 }
 
 fn shape(words: &[&str]) -> Result<Shape, String> {
@@ -58,9 +112,9 @@ fn shape(words: &[&str]) -> Result<Shape, String> {
         return Err(format!("expected 4 numbers (x y z r) or 6 (x y z hx hy hz), found {}", words.len()));
     }
     for (number, word) in numbers.iter_mut().zip(words) {
-        *number = word.parse().map_err(|_| format!("\"{word}\" is not a number"))?;
+        *number = word.parse().map_err(|_| format!("\"{}\" is not a number", short(word)))?;
         if !number.is_finite() {
-            return Err(format!("\"{word}\" is no finite number"));
+            return Err(format!("\"{}\" is no finite number", short(word)));
         }
     }
     let [x, y, z, a, b, c] = numbers;
@@ -78,7 +132,7 @@ mod tests {
 
     #[test]
     fn spheres_and_boxes_in_every_notation() {
-        let text = "# made by hand\nx;y;z;r\n1 2 3 0.5\n\n-1,2e0,\t3, 4 # a large one\n0;0;0;1;2;3\r\n";
+        let text = "# made by hand\n1 2 3 0.5\n\n-1,2e0,\t3, 4 # a large one\n0;0;0;1;2;3\r\n";
         let expected = [
             Shape::sphere(Vec3::new(1.0, 2.0, 3.0), 0.5),
             Shape::sphere(Vec3::new(-1.0, 2.0, 3.0), 4.0),
@@ -88,11 +142,34 @@ mod tests {
     }
 
     #[test]
+    fn a_head_names_the_columns() {
+        for text in
+            ["x,y,z,r\n1,2,3,.5\n", "r,x,y,z\n.5,1,2,3\n", "\u{feff}\"Z\";\"Y\";\"X\";\"Radius\"\n3;2;1;.5\n"]
+        {
+            assert_eq!(parse(text).unwrap(), [Shape::sphere(Vec3::new(1.0, 2.0, 3.0), 0.5)], "{text}");
+        }
+        let boxes = parse("hx hy hz x y z\n4 5 6 1 2 3\n").unwrap();
+        assert_eq!(boxes, [Shape::cuboid(Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0))]);
+    }
+
+    #[test]
     fn faults_name_their_line() {
         let fault = |text: &str| parse(text).unwrap_err();
         assert_eq!(fault("0 0 0 1\n0 0 0").0, 2);
         assert!(fault("0 0 0 1\n0 0 0").1.contains("found 3"));
         assert_eq!(fault("0 0 0 1\nx y z r").0, 2, "a head stands first");
+        for (head, words) in [
+            ("x,y,z,diameter", "no column \"diameter\""),
+            ("x,y,z", "columns x, y, z are not"),
+            ("x,y,z,r,r", "are not those of a shape"),
+            ("x,y,z,z", "are not those of a shape"),
+            ("x,y,z,hx,hy,r", "are not those of a shape"),
+            ("my spheres", "no column \"my\""),
+        ] {
+            let (line, reason) = fault(&format!("# remark\n{head}\n1,2,3,.5\n"));
+            assert!(line == 2 && reason.contains(words), "{head}: {reason}");
+        }
+        assert!(fault("x,y,z,r\n0,0,0,1,1,1").1.contains("expected 4 numbers, as the head names, found 6"));
         assert!(fault("0 0 0 1x").1.contains("\"1x\""));
         assert!(fault("0 0 nan 1").1.contains("finite"));
         assert!(fault("0 0 0 -1").1.contains("negative"));

@@ -5,6 +5,11 @@ use std::path::{Path, PathBuf};
 
 use percent_encoding::percent_decode_str;
 
+use super::short;
+
+/// Longest path that is looked for, bytes.
+const MOST_NAME_BYTES: usize = 4096;
+
 /// Where the bytes of a URI are.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Location {
@@ -16,47 +21,61 @@ pub(crate) enum Location {
 
 /// Finds out where the bytes of a URI are; `folder` is that of the model.
 pub(crate) fn resolve(uri: &str, folder: &Path) -> Result<Location, String> {
-    if let Some(data) = uri.strip_prefix("data:") {
+    if let Some((scheme, data)) = uri.split_once(':')
+        && scheme.eq_ignore_ascii_case("data")
+    {
         return decode_data(data).map(Location::Data);
     }
     if is_address(uri) {
-        let scheme = uri.split(':').next().unwrap_or_default();
+        let (scheme, uri) = (short(uri.split(':').next().unwrap_or_default()), short(uri));
         return Err(format!("\"{uri}\" names a {scheme} address; only files beside the model are read"));
     }
     let decoded = percent_decode_str(uri)
         .decode_utf8()
-        .map_err(|_| format!("\"{uri}\" is not UTF-8 after percent decoding"))?;
+        .map_err(|_| format!("\"{}\" is not UTF-8 after percent decoding", short(uri)))?;
     beside(&decoded, folder).map(Location::File)
 }
 
 /// A path as written in a file, relative to `folder` and not above it.
 pub(super) fn beside(name: &str, folder: &Path) -> Result<PathBuf, String> {
+    below(name, folder, folder)
+}
+
+/// A path as written in a file, relative to `folder`, which is `root` or below it, and not above `root`.
+pub(super) fn below(name: &str, folder: &Path, root: &Path) -> Result<PathBuf, String> {
     if name.is_empty() || name.contains('\0') {
         return Err("the file name is empty or holds a zero byte".to_owned());
     }
     let name = name.replace('\\', "/");
+    let shown = short(&name);
+    if name.len() > MOST_NAME_BYTES {
+        return Err(format!("\"{shown}\" is longer than any file name"));
+    }
     let drive = name.as_bytes().get(1) == Some(&b':');
     if name.starts_with('/') || drive {
-        return Err(format!("\"{name}\" is an absolute path; only files beside the model are read"));
+        return Err(format!("\"{shown}\" is an absolute path; only files beside the model are read"));
     }
-    let mut parts: Vec<&str> = Vec::new();
+    let between = folder.strip_prefix(root).map_err(|_| format!("\"{shown}\" is not beside the model"))?;
+    let between: Vec<String> =
+        between.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
+    let mut parts: Vec<&str> = between.iter().map(String::as_str).collect();
     for part in name.split('/') {
         match part {
             "" | "." => {}
             ".." => {
                 if parts.pop().is_none() {
                     return Err(format!(
-                        "\"{name}\" reaches above the folder of the model, which is not allowed"
+                        "\"{shown}\" reaches above the folder of the model, which is not allowed"
                     ));
                 }
             }
             part => parts.push(part),
         }
     }
-    let path = parts.iter().fold(folder.to_owned(), |path, part| path.join(part));
-    if leads_out(&path, folder) {
+    let path = parts.iter().fold(root.to_owned(), |path, part| path.join(part));
+    if leads_out(&path, root) {
         return Err(format!(
-            "\"{name}\" is a link that leads out of the folder of the model, which is not allowed"
+            "\"{shown}\" is a link that leads out of the folder of the model, which is not allowed"
         ));
     }
     Ok(path)
@@ -83,7 +102,8 @@ pub(crate) fn is_address(text: &str) -> bool {
 fn decode_data(data: &str) -> Result<Vec<u8>, String> {
     let (header, body) = data.split_once(',').ok_or("the data URI has no comma and so no data")?;
     let body: Vec<u8> = percent_decode_str(body).collect();
-    if header.ends_with(";base64") { decode_base64(&body) } else { Ok(body) }
+    let is_base64 = header.rsplit_once(';').is_some_and(|(_, end)| end.eq_ignore_ascii_case("base64"));
+    if is_base64 { decode_base64(&body) } else { Ok(body) }
 }
 
 /// RFC 4648, section 4; padding may be missing, white space is skipped.
@@ -135,6 +155,30 @@ mod tests {
         assert!(decode_base64(b"a").is_err());
         assert!(decode_base64(b"a?==").is_err());
         assert!(decode_base64(b"aG=s").is_err());
+    }
+
+    #[test]
+    fn schemes_ignore_case_and_long_names_are_cut() {
+        let folder = Path::new("models");
+        assert_eq!(resolve("DATA:;BASE64,aGVsbG8=", folder), Ok(Location::Data(b"hello".to_vec())));
+        assert_eq!(resolve("data:,a%20b", folder), Ok(Location::Data(b"a b".to_vec())));
+        let long = "x".repeat(100_000);
+        for bad in [long.clone(), format!("http://host/{long}"), format!("/{long}"), format!("{long}:y")] {
+            let said = resolve(&bad, folder).unwrap_err();
+            assert!(said.len() < 300 && said.contains("x\u{2026}"), "{said}");
+        }
+    }
+
+    #[test]
+    fn from_a_folder_below_a_path_reaches_up_to_that_of_the_model() {
+        let (root, library) = (Path::new("models"), Path::new("models/sub/mtl"));
+        let file = |name| below(name, library, root);
+        assert_eq!(file("a.png"), Ok("models/sub/mtl/a.png".into()));
+        assert_eq!(file("..\\..\\a.png"), Ok("models/a.png".into()));
+        for bad in ["../../../a.png", "/a.png", "../../../models/a.png"] {
+            assert!(file(bad).is_err(), "{bad}");
+        }
+        assert!(below("a.png", Path::new("elsewhere"), root).is_err());
     }
 
     #[test]

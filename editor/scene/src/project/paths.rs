@@ -4,7 +4,7 @@
 
 use std::path::{Component, Path, PathBuf, absolute};
 
-use crate::import::{is_address, leads_out};
+use crate::import::{is_address, leads_out, short};
 
 /// Why a path is not followed.
 #[derive(Debug, PartialEq, Eq)]
@@ -43,6 +43,10 @@ pub(super) fn to_relative(project: &Path, path: &Path) -> String {
 
 /// The other way round; nothing is refused, and the path may lead anywhere.
 pub(super) fn from_relative(project: &Path, text: &str) -> PathBuf {
+    if is_address(text) {
+        // As it was written, with both of its slashes: it is only shown and kept.
+        return folder_of(project).join(text);
+    }
     normalized(&folder_of(project).join(text))
 }
 
@@ -53,11 +57,15 @@ pub(super) fn resolve(project: &Path, text: &str) -> Result<PathBuf, Refusal> {
     }
     if is_address(text) || text.starts_with("//") || text.starts_with("\\\\") {
         return Err(Refusal::Never(format!(
-            "\"{text}\" names another machine or an address; only files are read"
+            "\"{}\" names another machine or an address; only files are read",
+            short(text)
         )));
     }
     if is_foreign(text) {
-        return Err(Refusal::Never(format!("\"{text}\" names a drive, which this machine does not have")));
+        return Err(Refusal::Never(format!(
+            "\"{}\" names a drive, which this machine does not have",
+            short(text)
+        )));
     }
     let folder = folder_of(project);
     let path = from_relative(project, text);
@@ -108,6 +116,7 @@ fn with_slashes(path: &Path) -> String {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
 

@@ -19,7 +19,7 @@ use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, Sha
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
 use crate::ids::{MaterialId, MeshId, NodeId, Target};
-use crate::import::{self, ImportOptions, Warning};
+use crate::import::{self, ImportOptions, Warning, short};
 use crate::node::{Node, NodeKind, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage, package_with_ids};
 
@@ -46,10 +46,17 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ProjectProblem> {
 
 /// The text of a project file as this version has it.
 pub(super) fn parse(bytes: &[u8]) -> Result<ProjectFile, ProjectProblem> {
+    if bytes.starts_with(b"\xEF\xBB\xBF") {
+        let reason = "not a valid project: it begins with a byte order mark; save it without one";
+        return Err(ProjectProblem::Broken(reason.to_owned()));
+    }
+    if import::is_utf16(bytes) {
+        return Err(ProjectProblem::Broken(format!("not a valid project: it {}", import::UTF16)));
+    }
     let value: Value = serde_json::from_slice(bytes)?;
     let version = value.get("caustica").ok_or(ProjectProblem::NotAProject)?;
     let is_none = || ProjectProblem::NoVersion(version.to_string().chars().take(40).collect());
-    let found = version.as_u64().ok_or_else(is_none)?;
+    let found = version.as_u64().filter(|found| *found > 0).ok_or_else(is_none)?;
     if found > SCHEMA_VERSION {
         return Err(ProjectProblem::Newer { found });
     }
@@ -156,8 +163,10 @@ impl Loader<'_> {
             Ok(path) => (path, Ok(())),
             Err(Refusal::Outside(path)) if self.options.outside_project => (path, Ok(())),
             Err(Refusal::Outside(path)) => {
-                let reason =
-                    format!("\"{text}\" lies outside of the folder of the project and is not read unasked");
+                let reason = format!(
+                    "\"{}\" lies outside of the folder of the project and is not read unasked",
+                    short(text)
+                );
                 self.outside.push(path.clone());
                 (path, Err(reason))
             }
@@ -231,8 +240,10 @@ impl Loader<'_> {
     pub fn read_shapes(&mut self, path: PathBuf, allowed: Result<(), String>) -> ShapeFile {
         let read = allowed.and_then(|()| import::load_shapes(&path).map_err(|error| error.to_string()));
         read.unwrap_or_else(|reason| {
-            let place = format!("shapes {}", path.display());
-            self.warn(place, format!("{reason}; nothing stands in its place, and it is kept on save"));
+            self.warn(
+                "shapes".to_owned(),
+                format!("{reason}; nothing stands in its place, and it is kept on save"),
+            );
             ShapeFile { path, shapes: None }
         })
     }

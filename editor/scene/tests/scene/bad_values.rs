@@ -281,8 +281,8 @@ fn clips_that_begin_before_zero_play_the_same_from_zero_on() {
     let line = [0.0, 0.0, 0.0, 2.0, 4.0, 0.0, 8.0, 0.0, 0.0];
     let turn = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, half, half];
     let cubic: Vec<f32> = (0..27).map(|i| ((i * 7) % 11) as f32 - 5.0).collect();
-    let cases: [(&[f32], &str, &str, usize, &[f32], usize); 6] = [
-        (&[-1.0, 1.0, 3.0], "LINEAR", "translation", 3, &line, 3),
+    let cases = [
+        (&[-1.0, 1.0, 3.0][..], "LINEAR", "translation", 3, &line[..], 3),
         (&[-1.0, 1.0, 3.0], "STEP", "translation", 3, &line, 3),
         (&[-2.0, -1.0, 3.0], "CUBICSPLINE", "translation", 3, &cubic, 2),
         (&[-1.0, 3.0], "LINEAR", "rotation", 4, &turn, 2),

@@ -131,7 +131,7 @@ fn uneven_corners_lines_and_remarks_do_no_harm() {
     assert_eq!(
         found,
         [
-            "1 faces of fewer than three corners were left out",
+            "1 face of fewer than three corners was left out",
             "2 points, lines, curves or surfaces were left out"
         ]
     );
@@ -322,6 +322,81 @@ fn libraries_are_found_by_names_with_blanks_and_in_lists() {
     assert_eq!(imported.warnings[0].place, "mtllib absent.mtl");
 }
 
+/// An OBJ file with a library in a folder below it.
+fn in_sub_folder(folder: &Path, mtl: &str) -> Imported {
+    std::fs::create_dir_all(folder.join("model/sub")).unwrap();
+    std::fs::write(folder.join("model/sub/a.mtl"), format!("newmtl m\n{mtl}\n")).unwrap();
+    let path = folder.join("model/m.obj");
+    let obj = "mtllib .\\sub\\a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl m\nf 1 2 3\n";
+    std::fs::write(&path, obj).unwrap();
+    imported(&path)
+}
+
+#[test]
+fn a_library_in_a_folder_below_reaches_up_to_that_of_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("model")).unwrap();
+    row(folder.path(), "outside.png", &[grey(9)]);
+    row(&folder.path().join("model"), "red.png", &[[255, 0, 0, 255]]);
+    for name in ["../red.png", "..\\red.png", "red.png"] {
+        let imported = in_sub_folder(folder.path(), &format!("map_Kd {name}"));
+        assert!(imported.warnings.is_empty(), "{name}: {:?}", imported.warnings);
+        let map = texture(&imported, material(&imported).base_color_texture);
+        assert_eq!(&map.rgba8[..4], [255, 0, 0, 255], "{name}");
+    }
+    let said =
+        |name: &str| in_sub_folder(folder.path(), &format!("map_Kd {name}")).warnings[0].message.clone();
+    assert!(said("../../outside.png").contains("reaches above the folder of the model"));
+    assert!(said("../absent.png").contains("cannot be opened"));
+}
+
+#[test]
+fn a_face_of_too_many_corners_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    // A comb: concave, and nowhere across itself.
+    let teeth = 9_000;
+    let mut obj = String::new();
+    for tooth in 0..teeth {
+        obj += &format!("v {} 1 0\nv {tooth}.5 0.5 0\n", tooth);
+    }
+    obj += &format!("v {teeth} -1 0\nv 0 -1 0\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0.2 0.2 0\n");
+    let all: Vec<String> = (1..=2 * teeth + 2).map(|corner| corner.to_string()).collect();
+    obj += &format!("f {}\n", all.join(" "));
+    let path = folder.path().join("comb.obj");
+    std::fs::write(&path, &obj).unwrap();
+    let said = |path: &Path| {
+        let imported = load(path, &ImportOptions::default()).unwrap();
+        imported.warnings.into_iter().map(|warning| warning.message).collect::<Vec<_>>()
+    };
+    let words = said(&path);
+    let large = "1 face has more than 16384 corners, too many to be clipped";
+    assert!(words.iter().any(|word| word.starts_with(large)), "{words:?}");
+    assert!(!words.iter().any(|word| word.contains("crosses itself")), "{words:?}");
+}
+
+#[test]
+fn text_in_utf16_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "mtllib a.mtl\nv 0 0 0\n";
+    let marked: Vec<u8> =
+        "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    let bare: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+    let path = folder.path().join("a.obj");
+    for bytes in [&marked, &bare] {
+        std::fs::write(&path, bytes).unwrap();
+        let error = load(&path, &ImportOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("a.obj: is text in UTF-16"), "{error}");
+        let shapes = folder.path().join("a.xyz");
+        std::fs::write(&shapes, bytes).unwrap();
+        let error = caustica_scene::import::load_shapes(&shapes).unwrap_err().to_string();
+        assert!(error.contains("is text in UTF-16"), "{error}");
+    }
+    std::fs::write(&path, format!("{text}v 1 0 0\nv 0 1 0\nf 1 2 3\n")).unwrap();
+    std::fs::write(folder.path().join("a.mtl"), &marked).unwrap();
+    let imported = load(&path, &ImportOptions::default()).unwrap();
+    assert!(imported.warnings[0].message.contains("a.mtl: is text in UTF-16"), "{:?}", imported.warnings);
+}
+
 #[test]
 fn line_ends_of_old_macs_are_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -342,7 +417,7 @@ fn a_file_that_shows_nothing_says_why() {
     let path = folder.path().join("nothing.obj");
     let nothing = "the file holds no triangle that could be shown";
     let not_finite = format!("a position is not finite, and {nothing}");
-    let flat = "1 triangles without area or with positions that are not finite were removed";
+    let flat = "1 triangle without area or with positions that are not finite was removed";
     for (text, place, reason) in [
         ("v 0 0 0\nv 1e308 0 0\nv 0 1 0\nf 1 2 3\n", "line 2", not_finite.clone()),
         ("\nv 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "line 4", not_finite),

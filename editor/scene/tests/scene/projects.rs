@@ -202,7 +202,7 @@ fn other_files_and_newer_versions_are_refused_in_words() {
     assert!(matches!(newer.problem, ProjectProblem::Newer { found: 99 }));
     assert!(newer.to_string().contains("newer version"), "{newer}");
     assert!(matches!(load("{}").problem, ProjectProblem::NotAProject));
-    for version in ["\"2\"", "1.5", "-1", "null"] {
+    for version in ["\"2\"", "1.5", "-1", "null", "0"] {
         let problem = load(&format!("{{\"caustica\": {version}}}"));
         let words = format!("the field \"caustica\" is {version}, which is no version number");
         assert!(problem.to_string().contains(&words), "{problem}");
@@ -214,6 +214,12 @@ fn other_files_and_newer_versions_are_refused_in_words() {
         assert!(load(spent).to_string().contains("leaves no room"), "{}", load(spent));
     }
     assert!(matches!(load("no").problem, ProjectProblem::Json(_)));
+    let marked = load("\u{feff}{\"caustica\": 2}").to_string();
+    assert!(marked.contains("begins with a byte order mark"), "{marked}");
+    let wide: Vec<u8> = "{\"caustica\": 2}".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    std::fs::write(folder.path().join("wide.caustica"), wide).unwrap();
+    let wide = Project::load(&folder.path().join("wide.caustica")).unwrap_err().to_string();
+    assert!(wide.contains("UTF-16"), "{wide}");
     let twice = r#"{"caustica":1,"nodes":[{"id":1,"name":"a"},{"id":1,"name":"b"}]}"#;
     assert!(matches!(load(twice).problem, ProjectProblem::Broken(_)));
     let orphan = r#"{"caustica":1,"nodes":[{"id":1,"name":"a","parent":7}]}"#;

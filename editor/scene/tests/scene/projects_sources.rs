@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use crate::projects::meta;
 use caustica_scene::import::{ImportOptions, load};
-use caustica_scene::{Document, Edit, Local, Material, MaterialId, PrefabId, Project, ProjectMeta};
+use caustica_scene::{
+    Document, Edit, Finding, Local, Material, MaterialId, PrefabId, Project, ProjectMeta, Severity, audit,
+};
 use serde_json::{Value, json};
 
 /// A model of one triangle for each of these materials, each with a texture of its own.
@@ -232,6 +234,43 @@ fn paths_of_other_machines_stay_as_they_were_written() {
             assert_eq!(saved["environment"]["path"], sky);
         }
     }
+}
+
+#[test]
+fn surroundings_that_are_missing_are_an_error_and_addresses_are_shown_as_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.caustica.json");
+    let text = json!({"caustica": 2, "prefabs": [{"id": 1, "name": "m", "source": "http://host/a.glb"}],
+        "environment": {"kind": "file", "path": "absent.hdr"}});
+    std::fs::write(&path, text.to_string()).unwrap();
+    let findings = audit(&Project::load(&path).unwrap().document);
+    let errors: Vec<&Finding> = findings.iter().filter(|found| found.severity == Severity::Error).collect();
+    let [source, sky] = errors[..] else { panic!("{findings:?}") };
+    assert!(source.message.contains("http://host/a.glb could not be read"), "{source}");
+    assert!(sky.about().starts_with("scene \"environment\": "), "{sky}");
+    assert!(sky.message.contains("absent.hdr could not be read"), "{sky}");
+}
+
+#[test]
+fn materials_of_primitives_that_a_mesh_lacks_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = crate::common::scene(folder.path());
+    let path = folder.path().join("scene.caustica.json");
+    Project::save(&path, &scene.document, &Default::default()).unwrap();
+    let mut value: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    let red = scene.document.prefab(scene.prefab).unwrap().materials[0].0;
+    let nodes = value["nodes"].as_array_mut().unwrap();
+    let first = nodes.iter_mut().find(|node| node["name"] == "First").unwrap();
+    first["overrides"] = json!({"Root/Arm/Plate": {"materials": {"1": red, "7": red}}, "Root/Lamp": {"materials": {"0": red}}});
+    std::fs::write(&path, value.to_string()).unwrap();
+    let project = Project::load(&path).unwrap();
+    let words: Vec<String> = audit(&project.document).iter().map(ToString::to_string).collect();
+    let said = |words_of: &str| {
+        words.iter().any(|word| word.starts_with("warning: First") && word.contains(words_of))
+    };
+    assert!(said("primitives 7 of Root/Arm/Plate, whose mesh has 2 primitives"), "{words:?}");
+    assert!(said("primitives 0 of Root/Lamp, whose mesh has 0 primitives"), "{words:?}");
+    assert_eq!(words.len(), 2, "{words:?}");
 }
 
 #[cfg(unix)]

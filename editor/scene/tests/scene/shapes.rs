@@ -160,6 +160,8 @@ fn shapes_of_a_file_are_read_again_and_missed_in_words() {
     std::fs::remove_file(&list).unwrap();
     let missing = Project::load(&path).unwrap();
     assert_eq!(missing.warnings.len(), 1);
+    let warning = missing.warnings[0].to_string();
+    assert_eq!(warning.matches("balls.xyz").count(), 1, "{warning}");
     assert!(missing.document.contains(Target::node(node)));
     let findings = audit(&missing.document);
     assert!(
@@ -178,6 +180,6 @@ fn shapes_without_a_size_are_found() {
     add(&mut document, "points", ShapeSource::File(file));
     add(&mut document, "none", cloud(0));
     let words: Vec<String> = audit(&document).iter().map(ToString::to_string).collect();
-    assert!(words[0].contains("points: 1 spheres or boxes have no size"), "{words:?}");
+    assert!(words[0].contains("points: 1 sphere or box has no size and is not seen"), "{words:?}");
     assert!(words[1].contains("none: there is not one sphere"), "{words:?}");
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use crate::ids::PrefabId;
+use crate::import::short;
 use crate::prefab::Prefab;
 use crate::prefab::scenes::told_apart;
 
@@ -47,7 +48,8 @@ impl<'a> Variants<'a> {
         };
         let says_more = |value: &Value| value.as_object().is_some_and(|o| o.keys().any(|key| key != "name"));
         if says_more(value) && self.list.get(place).is_some_and(|(_, first)| *first != value) {
-            let what = format!("what it says of the variant \"{name}\" beside its name is left out");
+            let what =
+                format!("what it says of the variant \"{}\" beside its name is left out", short(&name));
             warnings.push(format!("{}: {what}, another source has it too", prefab.name));
         }
         place

@@ -7,6 +7,7 @@ use super::check::Counts;
 use super::compressed;
 use super::json::{Fault, Item};
 use crate::foreign::Numbers;
+use crate::import::short;
 
 /// Most elements of an accessor that no bytes stand behind.
 const MAX_UNBACKED_COUNT: usize = 1 << 24;
@@ -313,7 +314,7 @@ fn accessor(item: &Item<'_>, views: &[View]) -> Result<Accessor, Fault> {
         "MAT2" => (4, true),
         "MAT3" => (9, true),
         "MAT4" => (16, true),
-        other => return Err(item.fault(format!("type {other} does not exist"))),
+        other => return Err(item.fault(format!("type {} does not exist", short(other)))),
     };
     let count = item.required_size("count")?;
     if count == 0 {

@@ -12,6 +12,7 @@ use super::node::Tree;
 use crate::animation::{Animation, Channel, ChannelPath, Interpolation};
 use crate::assets::{Camera, Light, Material, Mesh};
 use crate::foreign::KeptChannel;
+use crate::import::short;
 use crate::transform::Local;
 
 mod pointer;
@@ -81,9 +82,10 @@ impl Reader<'_> {
                         warnings.extend(begins_early(&channel, &unplayed));
                         kept.push(unplayed);
                     }
-                    None => {
-                        lost.push(format!("a channel of the clip \"{}\" that moves nothing", item.name()?))
-                    }
+                    None => lost.push(format!(
+                        "a channel of the clip \"{}\" that moves nothing",
+                        short(&item.name()?)
+                    )),
                 },
                 Ok(read) => {
                     for mut read in read {
@@ -152,7 +154,7 @@ impl Reader<'_> {
             None | Some("LINEAR") => Interpolation::Linear,
             Some("STEP") => Interpolation::Step,
             Some("CUBICSPLINE") => Interpolation::CubicSpline,
-            Some(other) => return Ok(Err(format!("interpolation {other:?} does not exist"))),
+            Some(other) => return Ok(Err(format!("interpolation {:?} does not exist", short(other)))),
         };
         if path == ChannelPath::Visibility && interpolation != Interpolation::Step {
             return Ok(Err("visibility has steps only".to_owned()));
@@ -192,9 +194,11 @@ impl Reader<'_> {
                     None => "",
                 };
                 let targets = self.pointed_at(pointer)?;
-                return Ok(targets.ok_or_else(|| format!("what {pointer:?} points at cannot be animated")));
+                return Ok(
+                    targets.ok_or_else(|| format!("what {:?} points at cannot be animated", short(pointer)))
+                );
             }
-            other => return Ok(Err(format!("path {other:?} does not exist"))),
+            other => return Ok(Err(format!("path {:?} does not exist", short(other)))),
         };
         let Some(node) = target.size("node")? else {
             return Ok(Ok(Vec::new()));

@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::extras;
 use super::json::{Fault, Item, POSITIVE, held};
 use crate::assets::{Camera, Light, LightKind, Projection};
+use crate::import::short;
 
 /// Radius of point and spot lights whose file gives none, metres: hard shadows, as other programs show them.
 const DEFAULT_LIGHT_RADIUS_M: f64 = 0.0;
@@ -91,7 +92,7 @@ pub(super) fn read_light(
             let angle_deg = angle_deg.min(180.0);
             LightKind::Directional { angular_radius_rad: (angle_deg.to_radians() / 2.0) as f32 }
         }
-        Some(other) => return Err(item.fault(format!("light type {other} does not exist"))),
+        Some(other) => return Err(item.fault(format!("light type {} does not exist", short(other)))),
         None => return Err(item.fault("\"type\" is missing")),
     };
     Ok(Light {

@@ -2,6 +2,7 @@
 //! reference names something that exists. In: the JSON. Out: a [`Fault`] with the place of the first error.
 
 use super::json::{Fault, Item};
+use crate::import::short;
 
 /// Extensions that may be required: those that are read, and those that may be left out without harm.
 const SUPPORTED: &[&str] = &[
@@ -37,6 +38,9 @@ const SUPPORTED: &[&str] = &[
 pub(crate) fn is_read(name: &str) -> bool {
     SUPPORTED.contains(&name) && name != "KHR_xmp_json_ld"
 }
+
+/// Most extensions that a message names.
+const MOST_NAMED: usize = 20;
 
 /// Number of entries in the lists of a file.
 #[derive(Clone, Copy, Debug, Default)]
@@ -76,7 +80,7 @@ pub(super) fn version(root: &Item<'_>) -> Result<(), Fault> {
             let place = format!("{}/{key}", asset.place());
             return Err(Fault::new(
                 place,
-                format!("glTF version {version} is not supported; version 2.0 is read"),
+                format!("glTF version {} is not supported; version 2.0 is read", short(version)),
             ));
         }
     }
@@ -88,7 +92,8 @@ pub(super) fn extensions(root: &Item<'_>) -> Result<Vec<String>, Fault> {
     let required = root.texts("extensionsRequired")?;
     let unknown: Vec<&str> = required.into_iter().filter(|name| !SUPPORTED.contains(name)).collect();
     if !unknown.is_empty() {
-        let names = unknown.join(", ");
+        let names: Vec<String> = unknown.into_iter().take(MOST_NAMED).map(short).collect();
+        let names = names.join(", ");
         let reason = format!("the file requires {names}, which is not supported");
         return Err(Fault::new("/extensionsRequired", reason));
     }

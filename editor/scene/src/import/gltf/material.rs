@@ -10,6 +10,7 @@ use super::extras;
 use super::json::{Fault, Item, POSITIVE, held};
 use super::texture::TextureTable;
 use crate::assets::{AlphaMode, MAX_RADIANCE, Material, ShadingMode, TextureUse};
+use crate::import::short;
 
 mod lobes;
 
@@ -141,7 +142,7 @@ impl Reader<'_> {
             None | Some("OPAQUE") => AlphaMode::Opaque,
             Some("MASK") => AlphaMode::Mask { cutoff: self.within(item, "alphaCutoff", 0.5, POSITIVE)? },
             Some("BLEND") => AlphaMode::Blend,
-            Some(other) => return Err(item.fault(format!("alphaMode {other} does not exist"))),
+            Some(other) => return Err(item.fault(format!("alphaMode {} does not exist", short(other)))),
         })
     }
 

@@ -14,6 +14,7 @@ use super::loose;
 use crate::assets::{Material, Mesh};
 use crate::foreign::{LooseMesh, Mapping, Unknown};
 use crate::ids::MaterialId;
+use crate::import::counted;
 
 /// All meshes, and whether a primitive asked for the default material.
 #[derive(Default)]
@@ -139,7 +140,8 @@ fn read(
     match loose.primitives.len() {
         0 => {}
         count => warnings.push(item.fault(format!(
-            "{count} primitives of points or lines are not rendered and only kept for exports"
+            "{} not rendered and only kept for exports",
+            counted(count, "primitive of points or lines is", "primitives of points or lines are")
         ))),
     }
     warnings.extend(repair_warnings(item, &builder.repairs));
@@ -209,19 +211,29 @@ pub(super) fn read_weights(
 
 fn repair_warnings(item: &Item<'_>, repairs: &Repairs) -> Vec<Fault> {
     let lines = [
-        (repairs.degenerate_triangles, "triangles without area were removed"),
-        (repairs.non_finite_triangles, "triangles with positions that are not finite were removed"),
+        (repairs.degenerate_triangles, "triangle without area was", "triangles without area were", "removed"),
+        (
+            repairs.non_finite_triangles,
+            "triangle with positions that are not finite was",
+            "triangles with positions that are not finite were",
+            "removed",
+        ),
         (
             repairs.non_finite_values,
-            "texture coordinates, colours, weights or morphs were not finite and were replaced",
+            "texture coordinate, colour, weight or morph was not finite and was",
+            "texture coordinates, colours, weights or morphs were not finite and were",
+            "replaced",
         ),
-        (repairs.replaced_normals, "normals had no direction and were replaced by those of their triangles"),
+        (
+            repairs.replaced_normals,
+            "normal had no direction and was",
+            "normals had no direction and were",
+            "replaced by those of their triangles",
+        ),
     ];
-    lines
-        .into_iter()
-        .filter(|(count, _)| *count > 0)
-        .map(|(count, what)| item.fault(format!("{count} {what}")))
-        .collect()
+    let found = lines.into_iter().filter(|(count, ..)| *count > 0);
+    let words = |(count, one, many, done)| item.fault(format!("{} {done}", counted(count, one, many)));
+    found.map(words).collect()
 }
 
 /// Three checked indices a triangle, from lists, strips and fans, indexed or not.

@@ -6,6 +6,8 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use crate::import::short;
+
 /// What tobj is given, and what the lines tell besides.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tidy {
@@ -233,7 +235,8 @@ impl Writer {
             if part.is_empty() && place > 0 {
                 continue;
             }
-            let number: i64 = part.parse().map_err(|_| format!("\"{corner}\" is no corner of a face"))?;
+            let number: i64 =
+                part.parse().map_err(|_| format!("\"{}\" is no corner of a face", short(corner)))?;
             let from_start =
                 if number < 0 { (count as i64).saturating_add(number) } else { number.saturating_sub(1) };
             if !(0..count as i64).contains(&from_start) {
@@ -244,7 +247,7 @@ impl Writer {
             }
         }
         match parts.next() {
-            Some(_) => Err(format!("\"{corner}\" is no corner of a face")),
+            Some(_) => Err(format!("\"{}\" is no corner of a face", short(corner))),
             None => Ok(indices),
         }
     }
@@ -258,7 +261,7 @@ fn rest(line: &str) -> &str {
 fn numbers<'a>(words: impl Iterator<Item = &'a str>, least: usize) -> Result<Vec<&'a str>, String> {
     let words: Vec<&str> = words.collect();
     if let Some(bad) = words.iter().find(|word| word.parse::<f32>().is_err()) {
-        return Err(format!("\"{bad}\" is not a number"));
+        return Err(format!("\"{}\" is not a number", short(bad)));
     }
     match words.len() < least {
         true => Err(format!("expected {least} numbers, found {}", words.len())),

@@ -14,7 +14,7 @@ use crate::assets::{Sampler, Texture, TextureUse, Wrap};
 use crate::ids::TextureId;
 use crate::import::gltf::buffers::read_file;
 use crate::import::image::{Pixels, decode, placeholder};
-use crate::import::{ImportOptions, uri};
+use crate::import::{ImportOptions, short, uri};
 
 /// Largest image file that is read, bytes.
 const MAX_IMAGE_FILE_BYTES: u64 = 1 << 30;
@@ -96,7 +96,7 @@ impl<'a> Maps<'a> {
                 Ok(pixels)
             });
             read.unwrap_or_else(|reason| {
-                let text = format!("{} cannot be read ({reason}); a checker stands in", map.file);
+                let text = format!("{} cannot be read ({reason}); a checker stands in", short(&map.file));
                 rest.warn(text, self.warnings);
                 placeholder()
             })
@@ -104,12 +104,16 @@ impl<'a> Maps<'a> {
         Some(Image { map, pixels })
     }
 
-    /// Beside the library, else beside the model.
+    /// Beside the library, else beside the model; from a library in a folder below, up to that of the model.
     fn place(&self, file: &str, library: &Path) -> Result<PathBuf, String> {
-        uri::beside(file, library)
-            .ok()
-            .filter(|path| path.is_file())
-            .map_or_else(|| uri::beside(file, self.folder), Ok)
+        let beside_library = uri::below(file, library, self.folder);
+        if let Ok(path) = &beside_library
+            && path.is_file()
+        {
+            return beside_library;
+        }
+        // What names no file beside the model either is told of where it is expected first.
+        uri::beside(file, self.folder).or(beside_library)
     }
 
     /// Colours as they are.
@@ -217,7 +221,7 @@ impl Map {
                     let nothing = if option == "-mm" { Vec2::Y } else { Vec2::ZERO };
                     ignored.extend((given != nothing).then_some(option));
                 }
-                other => return Err(format!("\"{other}\" is no option of a map")),
+                other => return Err(format!("\"{}\" is no option of a map", short(other))),
             }
         }
         rest.clone_into(&mut map.file);

@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use glam::Vec3;
 
-use super::Warnings;
+use super::{Warnings, short};
 
 /// One material as it stands in the file.
 #[derive(Clone, Debug)]
@@ -37,7 +37,7 @@ pub(super) fn parse(text: &str, file: &Path, warnings: &Warnings) -> Vec<Source>
                 None => warnings.add(
                     &file,
                     format!("line {number}"),
-                    format!("{key} before any newmtl is left out"),
+                    format!("{} before any newmtl is left out", short(key)),
                 ),
             },
         }
@@ -100,7 +100,7 @@ impl<'a> Rest<'a> {
 
     fn or_warn<T>(&self, value: Option<T>, expected: &str, warnings: &Warnings) -> Option<T> {
         if value.is_none() {
-            self.warn(format!("{expected}, found \"{}\"; the line is left out", self.text), warnings);
+            self.warn(format!("{expected}, found \"{}\"; the line is left out", short(self.text)), warnings);
         }
         value
     }

@@ -12,15 +12,30 @@ const STRAIGHT: f64 = 1e-6;
 /// Most corners of a face that may cross itself and is clipped all the same.
 const FEW: usize = 32;
 /// Most corners of a face that is clipped: whether it crosses itself is asked of every two edges.
-const MANY: usize = 1 << 14;
+pub(super) const MANY: usize = 1 << 14;
 
-/// Splits all faces; returns how many should have been clipped and became fans.
-pub(super) fn triangulate(mesh: &mut tobj::Mesh) -> usize {
-    let arities = std::mem::take(&mut mesh.face_arities);
-    if arities.is_empty() {
-        return 0;
+/// How many faces should have been clipped and became fans.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Fans {
+    /// They cross themselves.
+    pub crossed: usize,
+    /// They have more than [`MANY`] corners, so that nobody asked.
+    pub large: usize,
+}
+
+impl std::iter::Sum for Fans {
+    fn sum<I: Iterator<Item = Self>>(fans: I) -> Self {
+        fans.fold(Self::default(), |a, b| Self { crossed: a.crossed + b.crossed, large: a.large + b.large })
     }
-    let mut fans = 0;
+}
+
+/// Splits all faces.
+pub(super) fn triangulate(mesh: &mut tobj::Mesh) -> Fans {
+    let arities = std::mem::take(&mut mesh.face_arities);
+    let mut fans = Fans::default();
+    if arities.is_empty() {
+        return fans;
+    }
     let mut triangles = Vec::with_capacity(mesh.indices.len() * 3);
     let mut clipper = Clipper::default();
     let mut rest = &mesh.indices[..];
@@ -35,7 +50,8 @@ pub(super) fn triangulate(mesh: &mut tobj::Mesh) -> usize {
             fan(face, &mut triangles);
         } else if !clipper.clip(face, &corners, normal, &mut triangles) {
             fan(face, &mut triangles);
-            fans += 1;
+            let reason = if face.len() > MANY { &mut fans.large } else { &mut fans.crossed };
+            *reason += 1;
         }
     }
     mesh.indices = triangles;
@@ -187,10 +203,11 @@ mod tests {
             (0..2000).flat_map(|i| [(i * 7919 % 2003) as f32, (i * 104_729 % 1999) as f32, 0.0]).collect();
         let slit =
             [[0, 0], [4, 0], [4, 4], [0, 4], [0, 2], [2, 2], [0, 2]].map(|[x, y]| [x as f32, y as f32, 0.0]);
+        let fans = |crossed, large| Fans { crossed, large };
         for (positions, face, fans) in [
-            (positions, round_and_round, 1),
-            (star, (0..2000).collect(), 1),
-            (slit.concat(), (0..7).collect(), 0),
+            (positions, round_and_round, fans(0, 1)),
+            (star, (0..2000).collect(), fans(1, 0)),
+            (slit.concat(), (0..7).collect(), fans(0, 0)),
         ] {
             let arity = face.len();
             let mut mesh = tobj::Mesh {
@@ -199,7 +216,7 @@ mod tests {
                 face_arities: vec![arity as u32],
                 ..tobj::Mesh::default()
             };
-            assert_eq!(triangulate(&mut mesh), fans);
+            assert_eq!(triangulate(&mut mesh), fans, "{arity} corners");
         }
     }
 }

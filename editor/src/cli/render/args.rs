@@ -39,7 +39,7 @@ pub(in crate::cli) struct RenderArgs {
     /// Show the scene at this time of its animation; past the end of a clip it begins again. Without it: at rest
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub(super) at: Option<f64>,
-    /// Name of the camera
+    /// Name of the camera; the n-th of one name is NAME#n
     #[arg(long)]
     pub(super) camera: Option<String>,
     /// Show this scene of the file: its name, or its number from 1

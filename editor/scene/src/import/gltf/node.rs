@@ -13,9 +13,10 @@ use super::mesh::{Meshes, read_weights};
 use crate::assets::{Light, Mesh};
 use crate::foreign::LooseMesh;
 use crate::ids::MeshId;
-use crate::import::counted;
 use crate::prefab::{PartNode, SourceScene};
 use crate::transform::{Local, Trs};
+
+mod instances;
 
 /// Most parts that one file may bring, GPU instances counted.
 const MAX_PARTS: usize = 4_000_000;
@@ -200,8 +201,8 @@ impl Reader<'_> {
         };
         let instances = match (mesh, item.extension("EXT_mesh_gpu_instancing")?) {
             (Some(_), Some(extension)) => {
-                tree.lost.extend(lost_attributes(&extension)?);
-                self.read_instances(&extension, &mut tree.warnings)?
+                tree.lost.extend(instances::lost_attributes(&extension)?);
+                instances::read(self.accessors, &extension, &mut tree.warnings)?
             }
             _ => None,
         };
@@ -250,78 +251,6 @@ impl Reader<'_> {
         tree.light_of.insert(part, index);
         self.lights.get(index).map(|light| read_light(light, Some(item), &mut tree.warnings)).transpose()
     }
-
-    fn read_instances(
-        &self,
-        extension: &Item<'_>,
-        warnings: &mut Vec<Fault>,
-    ) -> Result<Option<Vec<Trs>>, Fault> {
-        let Some(attributes) = extension.child("attributes")? else {
-            return Ok(None);
-        };
-        let mut count = None;
-        let mut values = |name: &str, width: usize| {
-            let Some(index) = attributes.size(name)? else {
-                return Ok(None);
-            };
-            let accessor = self.accessors.get(index)?;
-            let fault = |reason| Fault::new(format!("{}/{name}", attributes.place()), reason);
-            if accessor.width != width || accessor.is_matrix {
-                return Err(fault(format!("accessor {index} has the wrong type")));
-            }
-            if *count.get_or_insert(accessor.count) != accessor.count {
-                return Err(fault("the attributes differ in their count".to_owned()));
-            }
-            if accessor.count > MAX_PARTS {
-                return Err(fault(format!("more than {MAX_PARTS} nodes are not read")));
-            }
-            self.accessors.floats::<4>(index, 0.0).map(Some)
-        };
-        let translations = values("TRANSLATION", 3)?;
-        let rotations = values("ROTATION", 4)?;
-        let scales = values("SCALE", 3)?;
-        let Some(count) = count else {
-            return Ok(None);
-        };
-        let at = |list: &Option<Vec<[f32; 4]>>, i: usize| {
-            let value = list.as_ref().and_then(|list| list.get(i)).copied();
-            value.filter(|v| v.iter().all(|v| v.is_finite()))
-        };
-        let vector = |[x, y, z, _]: [f32; 4]| DVec3::new(x.into(), y.into(), z.into());
-        let mut unusable: BTreeMap<&str, usize> = BTreeMap::new();
-        for (name, list) in [("TRANSLATION", &translations), ("ROTATION", &rotations), ("SCALE", &scales)] {
-            let bad = (0..count).filter(|&i| list.is_some() && at(list, i).is_none());
-            unusable.insert(name, bad.count());
-        }
-        let mut instance = |i| Trs {
-            translation: at(&translations, i).map_or(DVec3::ZERO, vector),
-            rotation: at(&rotations, i).map_or(DQuat::IDENTITY, |[x, y, z, w]| {
-                unit(DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into())).unwrap_or_else(|| {
-                    *unusable.entry("ROTATION").or_default() += 1;
-                    DQuat::IDENTITY
-                })
-            }),
-            scale: at(&scales, i).map_or(DVec3::ONE, vector),
-        };
-        let instances = (0..count).map(&mut instance).collect();
-        for (name, count) in unusable.into_iter().filter(|(_, count)| *count > 0) {
-            let place = format!("{}/{name}", attributes.place());
-            let what = if name == "ROTATION" { "of length 0 or not finite" } else { "not finite" };
-            warnings.push(Fault::new(
-                place,
-                format!("{} {what}: left out", counted(count, "value is", "values are")),
-            ));
-        }
-        Ok(Some(instances))
-    }
-}
-
-/// Attributes of GPU instances that are not read.
-fn lost_attributes(instancing: &Item<'_>) -> Result<Vec<String>, Fault> {
-    let Some(attributes) = instancing.child("attributes")? else { return Ok(Vec::new()) };
-    let is_read = |name: &str| ["TRANSLATION", "ROTATION", "SCALE"].contains(&name);
-    let names = attributes.object()?.keys().filter(|name| !is_read(name));
-    Ok(names.map(|name| format!("the attribute {name} of GPU instances")).collect())
 }
 
 /// `None` for a rotation without direction.

@@ -53,7 +53,7 @@ fn parse(text: &str) -> Result<Vec<Shape>, (usize, String)> {
             continue;
         }
         let in_order = match &head {
-            Some(head) => head.in_order(&words),
+            Some(head) => head.in_order(words),
             None => Ok(words),
         };
         shapes.push(in_order.and_then(|words| shape(&words)).map_err(fault)?);
@@ -93,14 +93,14 @@ impl Head {
         all.map(|places| Self { places }).ok_or_else(missing)
     }
 
-    /// The words of a line as shapes have them.
-    fn in_order<'a>(&self, words: &[&'a str]) -> Result<Vec<&'a str>, String> {
-        if words.len() != self.places.len() {
-            return Err(format!(
-                "expected {} numbers, as the head names, found {}",
-                self.places.len(),
-                words.len()
-            ));
+    /// The words of a line as shapes have them. Where the head has their order anyway, a line may be another shape.
+    fn in_order<'a>(&self, words: Vec<&'a str>) -> Result<Vec<&'a str>, String> {
+        let count = self.places.len();
+        if words.len() != count && self.places.is_sorted() {
+            return Ok(words);
+        }
+        if words.len() != count {
+            return Err(format!("expected {count} numbers, as the head names, found {}", words.len()));
         }
         Ok(self.places.iter().filter_map(|&place| words.get(place).copied()).collect())
     }
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn spheres_and_boxes_in_every_notation() {
-        let text = "# made by hand\n1 2 3 0.5\n\n-1,2e0,\t3, 4 # a large one\n0;0;0;1;2;3\r\n";
+        let text = "# made by hand\nx;y;z;r\n1 2 3 0.5\n\n-1,2e0,\t3, 4 # a large one\n0;0;0;1;2;3\r\n";
         let expected = [
             Shape::sphere(Vec3::new(1.0, 2.0, 3.0), 0.5),
             Shape::sphere(Vec3::new(-1.0, 2.0, 3.0), 4.0),
@@ -169,7 +169,7 @@ mod tests {
             let (line, reason) = fault(&format!("# remark\n{head}\n1,2,3,.5\n"));
             assert!(line == 2 && reason.contains(words), "{head}: {reason}");
         }
-        assert!(fault("x,y,z,r\n0,0,0,1,1,1").1.contains("expected 4 numbers, as the head names, found 6"));
+        assert!(fault("r,x,y,z\n0,0,0,1,1,1").1.contains("expected 4 numbers, as the head names, found 6"));
         assert!(fault("0 0 0 1x").1.contains("\"1x\""));
         assert!(fault("0 0 nan 1").1.contains("finite"));
         assert!(fault("0 0 0 -1").1.contains("negative"));

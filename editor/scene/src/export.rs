@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::assets::{Environment, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId};
-use crate::import::{Warning, counted, plain};
+use crate::import::{Warning, counted, plain, short};
 
 mod animation;
 mod buffer;
@@ -288,11 +288,11 @@ impl<'a> Writer<'a> {
             let color = material.base_color;
             if color.max_element() > 1.0 || color.min_element() < 0.0 {
                 let reason = format!("its base colour {color} is held to 0 to 1, as glTF wants it");
-                self.warn(&format!("material \"{}\"", material.name), reason);
+                self.warn(&format!("material \"{}\"", short(&material.name)), reason);
             }
         }
         for name in std::mem::take(&mut textures.missing) {
-            self.warn(&format!("texture \"{name}\""), "its image is missing and is left out");
+            self.warn(&format!("texture \"{}\"", short(&name)), "its image is missing and is left out");
         }
         (list, textures)
     }
@@ -338,7 +338,7 @@ impl<'a> Writer<'a> {
         let list = writer.write(tree);
         let (lights, cameras) = (writer.lights, writer.cameras);
         for (name, reason) in writer.warnings {
-            self.warn(&format!("node \"{name}\""), reason);
+            self.warn(&format!("node \"{}\"", short(&name)), reason);
         }
         Nodes { list, lights, cameras }
     }

@@ -4,7 +4,7 @@
 use std::fmt;
 
 use crate::ids::{MaterialId, MeshId, PrefabId, Target, TextureId};
-use crate::import::plain;
+use crate::import::{plain, short};
 
 /// How bad a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -68,7 +68,7 @@ impl fmt::Display for Finding {
             Severity::Warning => "warning",
             Severity::Error => "error",
         };
-        f.write_str(&plain(&format!("{severity}: {}: {}", self.name, self.message)))
+        f.write_str(&plain(&format!("{severity}: {}: {}", short(&self.name), self.message)))
     }
 }
 
@@ -77,7 +77,7 @@ impl Finding {
     pub fn about(&self) -> String {
         let (kind, id) = self.subject.kind_and_id();
         let bare = self.name == kind || self.name == format!("{kind} {id}");
-        let subject = if bare { self.name.clone() } else { format!("{kind} \"{}\"", self.name) };
+        let subject = if bare { self.name.clone() } else { format!("{kind} \"{}\"", short(&self.name)) };
         plain(&format!("{subject}: {}", self.message))
     }
 }
@@ -96,6 +96,7 @@ mod tests {
         let node = Subject::Target(Target::node(NodeId(7)));
         assert_eq!(about(node, "Chair\u{1b}[2J"), "node \"Chair\\u{1b}[2J\": it is flat");
         assert_eq!(about(node, "node 7"), "node 7: it is flat");
+        assert!(about(node, &"x".repeat(100_000)).len() < 120, "a long name is cut");
         assert_eq!(about(Subject::Material(MaterialId(2)), "Red"), "material \"Red\": it is flat");
         assert_eq!(about(Subject::Scene, "scene"), "scene: it is flat");
     }

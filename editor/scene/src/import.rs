@@ -22,8 +22,8 @@ mod uri;
 mod watched;
 
 pub use environment::load_environment;
-pub use error::{ImportError, Warning};
-pub(crate) use error::{UTF16, counted, is_utf16, plain, short};
+pub use error::{ImportError, Warning, counted};
+pub(crate) use error::{UTF16, is_utf16, plain, short};
 pub use shapes::load_shapes;
 pub(crate) use uri::{Location, is_address, leads_out, resolve};
 

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
-use caustica_scene::import::{Warning, load_environment};
+use caustica_scene::import::{Warning, counted, load_environment};
 use caustica_scene::{
     Document, Edit, Environment, EnvironmentFile, Finding, Mesh, Severity, Subject, Target, audit,
 };
@@ -118,15 +118,15 @@ impl Report {
             say!("{:?}: {}", finding.severity, finding.about());
         }
         say!(
-            "{}: {} triangles, {} spheres and boxes, {} materials, {} textures, {} import warnings, {} findings, {} errors",
+            "{}: {}, {}, {}, {}, {}, {}, {}",
             file.display(),
-            self.placed(Mesh::triangle_count),
-            self.placed(Mesh::shape_count),
-            self.document.materials().count(),
-            self.document.textures().count(),
-            self.warnings.len(),
-            self.findings.len(),
-            self.errors()
+            counted(self.placed(Mesh::triangle_count), "triangle", "triangles"),
+            counted(self.placed(Mesh::shape_count), "sphere or box", "spheres and boxes"),
+            counted(self.document.materials().count(), "material", "materials"),
+            counted(self.document.textures().count(), "texture", "textures"),
+            counted(self.warnings.len(), "import warning", "import warnings"),
+            counted(self.findings.len(), "finding", "findings"),
+            counted(self.errors(), "error", "errors")
         );
     }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use caustica_scene::import::counted;
 use caustica_scene::{ExportFormat, export};
 use clap::Args;
 use serde_json::json;
@@ -47,9 +48,12 @@ pub(super) fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
         );
     } else {
         say!(
-            "{}: {nodes} nodes, {meshes} meshes, {materials} materials, {} warnings",
+            "{}: {}, {}, {}, {}",
             args.output.display(),
-            exported.warnings.len()
+            counted(nodes, "node", "nodes"),
+            counted(meshes, "mesh", "meshes"),
+            counted(materials, "material", "materials"),
+            counted(exported.warnings.len(), "warning", "warnings")
         );
     }
     Ok(ExitCode::SUCCESS)

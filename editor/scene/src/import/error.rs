@@ -37,7 +37,7 @@ pub(crate) fn short(text: &str) -> String {
 }
 
 /// A count with its word, in the singular for one.
-pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+pub fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 

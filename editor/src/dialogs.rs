@@ -211,6 +211,7 @@ fn with_ending(wish: Wish, path: PathBuf) -> PathBuf {
 }
 
 #[cfg(test)]
+#[expect(clippy::expect_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
 

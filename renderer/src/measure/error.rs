@@ -64,7 +64,7 @@ impl<'a> Radiance<'a> {
     }
 }
 
-/// The error of a picture against a reference, without regard to how it is seen ([`super::flip`] for that).
+/// The error of a picture against a reference, without regard to how it is seen ([`crate::flip_ldr`] for that).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ErrorMetrics {
     /// Root of the mean squared difference, radiance.

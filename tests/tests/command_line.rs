@@ -383,7 +383,7 @@ fn wrong_usage_ends_with_2() {
         vec!["render", &gallery, "-o", "a.png", "--size", "0x10"],
         vec!["render", &gallery, "-o", "a.png", "--samples", "0"],
         vec!["render", &gallery, "-o", "a.png", "--pipeline", "magic"],
-        vec!["render", &gallery, "-o", "a.png", "--samples", "3", "--time", "1"],
+        vec!["render", &gallery, "-o", "a.png", "--samples", "3", "--time", "0"],
         vec!["--nonsense"],
         vec!["render", &gallery, "-o", "a.png", "--memory-budget", "0"],
         vec!["--memory-budget", "much"],

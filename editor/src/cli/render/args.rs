@@ -5,14 +5,13 @@ use std::path::PathBuf;
 use caustica_renderer::{
     NeedsMode, Pipeline, Primary, ReflectionRate, Sampler, ShadowRate, Show, ToneMap, ViewSettings,
 };
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use crate::cli::{SourceArgs, output};
 
 /// Arguments of `caustica render`.
 #[derive(Args, Debug)]
-#[command(group(ArgGroup::new("until").args(["samples", "time", "target_error"])))]
 pub(in crate::cli) struct RenderArgs {
     /// A project, .gltf, .glb or .obj
     pub(super) file: PathBuf,
@@ -27,7 +26,7 @@ pub(in crate::cli) struct RenderArgs {
     /// Size in pixels
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1280x720")]
     pub(super) size: [u32; 2],
-    /// Samples a pixel
+    /// Samples a pixel. Of samples, time and target error whatever is reached first counts
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) samples: Option<u64>,
     /// Seconds to render

@@ -29,9 +29,14 @@ pub(super) struct Tidy {
 /// A line number, from 1, and what is wrong there.
 pub(super) type LineFault = (usize, String);
 
-/// The text of a file; line ends of old Macs become those of today.
+/// The text of a file, without a byte order mark; line ends of old Macs become those of today. What is not UTF-8 is taken for
+/// Latin-1, in which every byte is a letter, so that two names stay two.
 pub(super) fn text_of(bytes: &[u8]) -> Cow<'_, str> {
-    let text = String::from_utf8_lossy(bytes);
+    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => Cow::Owned(bytes.iter().copied().map(char::from).collect()),
+    };
     if text.contains('\n') { text } else { Cow::Owned(text.replace('\r', "\n")) }
 }
 
@@ -287,6 +292,14 @@ mod tests {
         assert_eq!(line("v 0 0 0\nvt 0 0\nf 1/1//1 1 1"), Some(3));
         assert_eq!(line("v 0 0 \\\n0\nv 1 1 1 0"), Some(3));
         assert_eq!(line("v 0 0 0 1 1"), Some(1));
+    }
+
+    #[test]
+    fn marks_and_letters_of_other_systems_are_read() {
+        assert_eq!(text_of("\u{feff}v 0 0 0\n".as_bytes()), "v 0 0 0\n");
+        assert_eq!(text_of(b"usemtl \xe4\r\n"), "usemtl \u{e4}\r\n");
+        assert_eq!(text_of(b"v 0 0 0\rv 1 0 0"), "v 0 0 0\nv 1 0 0");
+        assert_eq!(text_of("usemtl \u{e4}\n".as_bytes()), "usemtl \u{e4}\n");
     }
 
     #[test]

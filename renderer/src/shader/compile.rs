@@ -21,6 +21,9 @@ const SPIRV_MAGIC: u32 = 0x0723_0203;
 /// Bump when the compiler or its options change.
 const CACHE_VERSION: u32 = 1;
 
+/// So deep files may include others.
+const MOST_INCLUDES: usize = 64;
+
 /// Compiled shaders on disk. Losing it costs time only.
 #[derive(Clone, Debug, Default)]
 pub struct SpirvCache {
@@ -102,7 +105,11 @@ struct Includes<'a> {
 }
 
 impl IncludeHandler for Includes<'_> {
-    fn include(&mut self, _: IncludeType, header: &str, _: &str, _: usize) -> Option<IncludeResult> {
+    fn include(&mut self, _: IncludeType, header: &str, _: &str, depth: usize) -> Option<IncludeResult> {
+        // Files that include each other would fill the memory.
+        if depth > MOST_INCLUDES {
+            return None;
+        }
         self.texts.get(header).map(|data| IncludeResult { name: header.to_owned(), data: data.clone() })
     }
 }
@@ -179,6 +186,14 @@ mod tests {
         let text = "#version 460\n#extension GL_GOOGLE_include_directive : require\n#include \"lib/a.glsl\"\nvoid main() {}\n";
         let error = compile_now(&source(text)).unwrap_err().to_string();
         assert!(error.contains("lib/a.glsl:2:"), "{error}");
+    }
+
+    #[test]
+    fn files_that_include_each_other_end_in_an_error() {
+        let head = "#version 460\n#extension GL_GOOGLE_include_directive : require\n";
+        let text = format!("{head}#include \"test.comp\"\nvoid main() {{}}\n");
+        let error = compile_now(&source(&text)).unwrap_err().to_string();
+        assert!(error.contains("test.comp:"), "{error}");
     }
 
     #[test]

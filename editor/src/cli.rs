@@ -149,6 +149,13 @@ pub fn run() -> ExitCode {
         }
     };
     let result = match cli.command {
+        _ if cli.shaders.as_ref().is_some_and(|folder| !folder.join("passes").is_dir()) => {
+            let folder = cli.shaders.unwrap_or_default();
+            Err(anyhow::anyhow!(
+                "--shaders {}: is no folder of shaders, it has no folder \"passes\"",
+                folder.display()
+            ))
+        }
         Some(Command::Render(args)) => logged(|| render::run(&args, &cli.device, cli.shaders.clone())),
         Some(Command::Check(args)) => logged(|| check::run(&args)),
         Some(Command::Export(args)) => logged(|| export::run(&args)),

@@ -17,7 +17,7 @@ pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
         built_in(cx, ui);
         return;
     };
-    cx.state.shaders.follow(&folder, &status);
+    cx.state.shaders.follow(&folder);
     Panel::left("shader files")
         .resizable(true)
         .default_size(230.0)

@@ -2,9 +2,14 @@
 //! A text that was not saved stays until it is saved or taken back, whatever else is opened.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
-use caustica_renderer::shader::{ShaderSources, ShaderStatus};
+use caustica_renderer::shader::ShaderSources;
+
+/// How often the files are looked at whose texts are open.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
 
 /// One text.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -25,8 +30,8 @@ pub struct ShaderTexts {
     pub has_focus: bool,
     /// The text gets the keyboard, as after a button above it, so that Ctrl+Z is about the text.
     pub wants_focus: bool,
-    /// How many changes of the folder were heard of when it was looked at last.
-    heard: u64,
+    /// When the files were looked at last.
+    looked: Option<Instant>,
 }
 
 impl ShaderTexts {
@@ -76,20 +81,28 @@ impl ShaderTexts {
         }
     }
 
-    /// Saves the text that is shown.
+    /// Saves the text that is shown. What another program has saved meanwhile is kept beside it, and the log says where.
     ///
     /// # Errors
-    /// When the file cannot be written; the text stays here.
+    /// When the file cannot be written, or is write-protected; the text stays here.
     pub fn save(&mut self, folder: &Path) -> Result<(), String> {
         let Some((file, text)) = self.shown.as_ref().and_then(|file| Some((file, self.open.get_mut(file)?)))
         else {
             return Ok(());
         };
         let path = folder.join(file);
-        // Another name first: who watches the folder never sees half a file.
-        let temporary = path.with_extension("caustica-new");
-        let written = std::fs::write(&temporary, &text.now).and_then(|()| std::fs::rename(&temporary, &path));
-        written.map_err(|error| format!("{} cannot be saved: {error}", path.display()))?;
+        let cannot = |error: std::io::Error| format!("{} cannot be saved: {error}", path.display());
+        if let Ok(theirs) = read(folder, file)
+            && theirs != text.saved
+            && theirs != text.now
+        {
+            let kept = keep_beside(&path, &theirs).map_err(cannot)?;
+            tracing::warn!(
+                "another program has saved {file} since it was shown here; what it saved is kept as {}",
+                kept.display()
+            );
+        }
+        replace(&path, &text.now).map_err(cannot)?;
         text.saved.clone_from(&text.now);
         Ok(())
     }
@@ -119,20 +132,48 @@ impl ShaderTexts {
         self.save(folder)
     }
 
-    /// Takes over what other programs have saved, where nothing was typed here.
-    pub fn follow(&mut self, folder: &Path, status: &ShaderStatus) {
-        let heard = status.reloads + status.refused;
-        if heard == std::mem::replace(&mut self.heard, heard) {
+    /// Takes over what other programs have saved, where nothing was typed here; looks twice a second.
+    pub fn follow(&mut self, folder: &Path) {
+        if self.looked.is_some_and(|looked| looked.elapsed() < LOOK_EVERY) {
             return;
         }
-        for (file, text) in &mut self.open {
+        self.looked = Some(Instant::now());
+        for (file, text) in self.open.iter_mut().filter(|(_, text)| text.now == text.saved) {
             let Ok(saved) = read(folder, file) else { continue };
-            if text.now == text.saved {
-                text.now.clone_from(&saved);
-            }
+            text.now.clone_from(&saved);
             text.saved = saved;
         }
     }
+}
+
+/// Writes a text under a name that nothing has yet.
+fn keep_beside(path: &Path, text: &str) -> std::io::Result<PathBuf> {
+    let free = (1..).map(|number| beside(path, &format!(".other-{number}"))).find(|path| !path.exists());
+    let free = free.unwrap_or_else(|| beside(path, ".other"));
+    std::fs::write(&free, text)?;
+    Ok(free)
+}
+
+/// Puts a text in the place of a file: another name first, so that who watches the folder never sees half of it. What a link leads
+/// to is replaced, not the link.
+fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let permissions = std::fs::metadata(&path).ok().map(|before| before.permissions());
+    if permissions.as_ref().is_some_and(std::fs::Permissions::readonly) {
+        return Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, "it is write-protected"));
+    }
+    let temporary = beside(&path, &format!(".{}.new", std::process::id()));
+    std::fs::write(&temporary, text)?;
+    if let Some(permissions) = permissions {
+        std::fs::set_permissions(&temporary, permissions)?;
+    }
+    std::fs::rename(&temporary, &path)
+}
+
+fn beside(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.file_name().map_or_else(OsString::new, ToOwned::to_owned);
+    name.push(suffix);
+    path.with_file_name(name)
 }
 
 fn read(folder: &Path, file: &str) -> Result<String, String> {
@@ -178,7 +219,7 @@ mod tests {
         let change = |file: &str| std::fs::write(folder.path().join(file), "// theirs\n").unwrap();
         change(file);
         change(other);
-        texts.follow(folder.path(), &ShaderStatus { reloads: 1, ..ShaderStatus::default() });
+        texts.follow(folder.path());
         assert_eq!(texts.text_mut().unwrap(), "// theirs\n");
         texts.show(folder.path(), file, None).unwrap();
         assert!(texts.text_mut().unwrap().ends_with("// mine\n"));
@@ -190,6 +231,8 @@ mod tests {
         texts.save(folder.path()).unwrap();
         assert!(texts.modified().is_empty() && texts.differs_from_built_in());
         assert!(read(folder.path(), file).unwrap().ends_with("// mine\n"));
+        let kept = std::fs::read_to_string(folder.path().join("lib/fresnel.glsl.other-1")).unwrap();
+        assert_eq!(kept, "// theirs\n", "nothing of another program is lost");
         texts.restore_built_in(folder.path()).unwrap();
         assert_eq!(read(folder.path(), file).unwrap(), built_in(file).unwrap());
         assert!(texts.show(folder.path(), "no/such.glsl", None).is_err());

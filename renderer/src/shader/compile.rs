@@ -110,7 +110,8 @@ impl IncludeHandler for Includes<'_> {
         if depth > MOST_INCLUDES {
             return None;
         }
-        self.texts.get(header).map(|data| IncludeResult { name: header.to_owned(), data: data.clone() })
+        let data = self.texts.get(header).map(|text| unmarked(text));
+        data.map(|data| IncludeResult { name: header.to_owned(), data })
     }
 }
 
@@ -122,7 +123,7 @@ fn compile_now(source: &Source) -> Result<Vec<u32>> {
     let compiler = Compiler::acquire().ok_or_else(|| refuse(String::from("glslang did not start")))?;
     let stage =
         stage_of(&source.file).ok_or_else(|| refuse(String::from("unknown stage: see the file's ending")))?;
-    let text = source.texts.get(&source.file).cloned().unwrap_or_default();
+    let text = source.texts.get(&source.file).map(|text| unmarked(text)).unwrap_or_default();
     let options = CompilerOptions {
         source_language: SourceLanguage::GLSL,
         target: Target::Vulkan { version: VulkanVersion::Vulkan1_3, spirv_version: SpirvVersion::SPIRV1_6 },
@@ -138,6 +139,11 @@ fn compile_now(source: &Source) -> Result<Vec<u32>> {
             .map_err(|error| refuse(log_of(&error)))?;
     let shader = compiler.create_shader(input).map_err(|error| refuse(log_of(&error)))?;
     shader.compile().map_err(|error| refuse(log_of(&error)))
+}
+
+/// Without a byte order mark, which the compiler takes for a statement.
+fn unmarked(text: &str) -> String {
+    text.strip_prefix('\u{feff}').unwrap_or(text).to_owned()
 }
 
 fn stage_of(file: &str) -> Option<ShaderStage> {
@@ -189,8 +195,9 @@ mod tests {
     }
 
     #[test]
-    fn files_that_include_each_other_end_in_an_error() {
+    fn files_that_include_each_other_end_in_an_error_and_marks_in_none() {
         let head = "#version 460\n#extension GL_GOOGLE_include_directive : require\n";
+        assert!(compile_now(&source(&format!("\u{feff}{head}void main() {{}}\n"))).is_ok());
         let text = format!("{head}#include \"test.comp\"\nvoid main() {{}}\n");
         let error = compile_now(&source(&text)).unwrap_err().to_string();
         assert!(error.contains("test.comp:"), "{error}");

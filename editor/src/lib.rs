@@ -20,4 +20,5 @@ mod sync;
 mod theme;
 mod ui_renderer;
 mod ui_state;
+mod whole_file;
 mod worker;

@@ -9,6 +9,8 @@ use exr::prelude::{
     SpecificChannels, Text, WritableImage,
 };
 
+use crate::whole_file;
+
 /// Whole rows, which every reader takes.
 const ENCODING: Encoding = Encoding {
     compression: Compression::ZIP16,
@@ -58,19 +60,10 @@ pub(super) fn write_png(path: &Path, extent: [u32; 2], display: &[[f32; 4]]) -> 
     replace(path, |path| Ok(image.save_with_format(path, image::ImageFormat::Png)?))
 }
 
-/// Writes a file beside the one of this name, and puts it in its place when it is whole: who looks at the picture, or ends the
-/// program, never has half of it.
+/// Writes a file whole, into a folder that is made where it is not there.
 fn replace(path: &Path, write: impl FnOnce(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
     make_folder(path)?;
-    // What a link leads to is replaced, not the link.
-    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let temporary = real.with_extension(format!("{}.new", std::process::id()));
-    let written = write(&temporary).and_then(|()| Ok(std::fs::rename(&temporary, &real)?));
-    if written.is_err() {
-        // It may not be there at all.
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written.with_context(|| path.display().to_string())
+    whole_file::replace(path, write).with_context(|| path.display().to_string())
 }
 
 /// Linear 0..1 to the nearest sRGB byte (IEC 61966-2-1).

@@ -2,11 +2,12 @@
 //! A text that was not saved stays until it is saved or taken back, whatever else is opened.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use caustica_renderer::shader::ShaderSources;
+
+use crate::whole_file::{self, beside};
 
 /// How often the files are looked at whose texts are open.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
@@ -154,26 +155,16 @@ fn keep_beside(path: &Path, text: &str) -> std::io::Result<PathBuf> {
     Ok(free)
 }
 
-/// Puts a text in the place of a file: another name first, so that who watches the folder never sees half of it. What a link leads
-/// to is replaced, not the link.
+/// Puts a text in the place of a file; who watches the folder never sees half of it.
 fn replace(path: &Path, text: &str) -> std::io::Result<()> {
-    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let permissions = std::fs::metadata(&path).ok().map(|before| before.permissions());
+    let permissions = std::fs::metadata(path).ok().map(|before| before.permissions());
     if permissions.as_ref().is_some_and(std::fs::Permissions::readonly) {
         return Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, "it is write-protected"));
     }
-    let temporary = beside(&path, &format!(".{}.new", std::process::id()));
-    std::fs::write(&temporary, text)?;
-    if let Some(permissions) = permissions {
-        std::fs::set_permissions(&temporary, permissions)?;
-    }
-    std::fs::rename(&temporary, &path)
-}
-
-fn beside(path: &Path, suffix: &str) -> PathBuf {
-    let mut name = path.file_name().map_or_else(OsString::new, ToOwned::to_owned);
-    name.push(suffix);
-    path.with_file_name(name)
+    whole_file::replace(path, |new| {
+        std::fs::write(new, text)?;
+        permissions.map_or(Ok(()), |permissions| std::fs::set_permissions(new, permissions))
+    })
 }
 
 fn read(folder: &Path, file: &str) -> Result<String, String> {

@@ -161,10 +161,7 @@ fn means(errors: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 fn finite(pixel: [f32; 3]) -> [f64; 3] {
-    match pixel.iter().all(|channel| channel.is_finite()) {
-        true => pixel.map(f64::from),
-        false => pixel.map(|channel| if channel.is_finite() { f64::from(channel) } else { 0.0 }),
-    }
+    pixel.map(|channel| if channel.is_finite() { f64::from(channel) } else { 0.0 })
 }
 
 fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

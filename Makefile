@@ -7,6 +7,8 @@ SHELL := /bin/bash
 TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 CAUSTICA := $(TARGET_DIR)/release/caustica
 DEMO := projects/gallery/gallery.caustica.json
+# What a report says of the program's source.
+export CAUSTICA_COMMIT ?= $(shell git rev-parse --short=9 HEAD 2>/dev/null)
 # Of the demo picture; `make demo SIZE=1920x1080 SAMPLES=256` overrides them.
 SIZE ?= 960x540
 SAMPLES ?= 48

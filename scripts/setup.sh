@@ -9,6 +9,8 @@ export DEBIAN_FRONTEND=noninteractive
 export RUSTUP_AUTO_INSTALL=0
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+# What a report says of the program's source; as in the Makefile, so that nothing is built twice.
+export CAUSTICA_COMMIT="${CAUSTICA_COMMIT:-$(git rev-parse --short=9 HEAD 2>/dev/null || true)}"
 
 backports_file=/etc/apt/sources.list.d/caustica-backports.sources
 

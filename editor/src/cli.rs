@@ -11,6 +11,8 @@ mod devices;
 mod export;
 mod output;
 mod render;
+mod report;
+mod shot;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -23,6 +25,7 @@ use caustica_renderer::gpu::{Device, DeviceOptions, GpuError, Instance, Instance
 use caustica_scene::import::Warning;
 use caustica_scene::{Document, Local, Project, ShapeSource};
 use clap::{Args, Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::device_watch::{DeviceWatch, end};
 use crate::recovery;
@@ -51,6 +54,8 @@ struct Cli {
 enum Command {
     /// Render a project or model to a PNG or EXR
     Render(render::RenderArgs),
+    /// Measure how far pipelines and settings are from a reference after how long
+    Report(report::ReportArgs),
     /// Audit a project or model: structure and numbers; exit code 1 on errors
     Check(check::CheckArgs),
     /// Write a project or model as .glb or .gltf
@@ -157,6 +162,7 @@ pub fn run() -> ExitCode {
             ))
         }
         Some(Command::Render(args)) => logged(|| render::run(&args, &cli.device, cli.shaders.clone())),
+        Some(Command::Report(args)) => logged(|| report::run(&args, &cli.device, cli.shaders.clone())),
         Some(Command::Check(args)) => logged(|| check::run(&args)),
         Some(Command::Export(args)) => logged(|| export::run(&args)),
         Some(Command::Devices(args)) => logged(|| devices::run(&args, &cli.device)),
@@ -222,6 +228,20 @@ fn document_of(file: &Path, sources: SourceArgs) -> anyhow::Result<(Document, Ve
         Loaded::Environment(..) => anyhow::bail!("{}: an environment has no scene", file.display()),
     };
     Ok((document, warnings))
+}
+
+/// A bar on a terminal, nothing elsewhere or where only an object is to be printed.
+fn progress_bar(json: bool) -> ProgressBar {
+    if json || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(100);
+    if let Ok(style) =
+        ProgressStyle::with_template("{msg:12} [{bar:40}] {pos}/{len} {elapsed} (about {eta} left)")
+    {
+        bar.set_style(style);
+    }
+    bar
 }
 
 /// What `say!` does.

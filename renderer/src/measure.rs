@@ -6,6 +6,7 @@ mod error;
 mod flip;
 mod noise;
 mod primary_bench;
+mod split;
 mod statistics;
 
 pub use accel_bench::{AccelBench, BareStructure, BlasTimes, TlasTimes};
@@ -13,4 +14,5 @@ pub use device_profile::{DeviceProfile, PrimaryTimes, ProfileInForce};
 pub use error::{ErrorMetrics, Radiance, relative_error_map};
 pub use flip::{Flip, flip_hdr, flip_ldr};
 pub use noise::{Estimate, Noise};
+pub use split::{Halves, Split};
 pub use statistics::{AccelStatistics, LeftOut, Statistics, TlasWork};

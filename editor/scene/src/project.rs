@@ -214,4 +214,13 @@ impl Project {
         };
         written().map_err(|problem| ProjectError { file: path.to_owned(), problem })
     }
+
+    /// What [`Self::save`] would write.
+    ///
+    /// # Errors
+    /// When the document cannot be written as a project.
+    pub fn text_of(path: &Path, document: &Document, meta: &ProjectMeta) -> Result<String, ProjectError> {
+        write::to_text(path, document, meta)
+            .map_err(|problem| ProjectError { file: path.to_owned(), problem })
+    }
 }

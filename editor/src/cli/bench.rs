@@ -2,6 +2,7 @@
 //! and one JSON object in a file. It measures and never judges: no exit code depends on a time.
 
 mod cloud;
+mod convergence;
 mod crowd;
 mod edits;
 mod hybrid;
@@ -30,6 +31,7 @@ use serde_json::{Map, Value, json};
 
 use super::DeviceArgs;
 use super::render::report_validation;
+use convergence::ConvergenceArgs;
 use hybrid::HybridArgs;
 use table::Table;
 
@@ -45,7 +47,10 @@ struct Part {
     run: fn(&Bench) -> anyhow::Result<Measured>,
 }
 
-const SUITES: [Suite; 4] = [ACCEL, SHAPES, HYBRID, RELOAD];
+const SUITES: [Suite; 5] = [ACCEL, SHAPES, HYBRID, RELOAD, CONVERGENCE];
+
+const CONVERGENCE: Suite =
+    Suite { name: "convergence", parts: &[Part { name: "samplers", run: convergence::run }] };
 
 const RELOAD: Suite = Suite { name: "reload", parts: &[Part { name: "files", run: reload::run }] };
 
@@ -87,6 +92,8 @@ pub(super) struct BenchArgs {
     json: bool,
     #[command(flatten)]
     hybrid: HybridArgs,
+    #[command(flatten)]
+    convergence: ConvergenceArgs,
 }
 
 fn names(known: &[&'static str]) -> PossibleValuesParser {
@@ -104,6 +111,7 @@ struct Bench {
     quick: bool,
     progress: bool,
     hybrid: HybridArgs,
+    convergence: ConvergenceArgs,
 }
 
 impl Bench {
@@ -148,6 +156,7 @@ pub(super) fn run(
         quick: args.quick,
         progress,
         hybrid: args.hybrid.clone(),
+        convergence: args.convergence.clone(),
     };
     let mut report = head(args, &device);
     // Written after every part: a run that is cut short leaves what it has measured.

@@ -4,19 +4,9 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use exr::prelude::{
-    AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder,
-    SpecificChannels, Text, WritableImage,
-};
 
+use crate::exr_file::{self, Note};
 use crate::whole_file;
-
-/// Whole rows, which every reader takes.
-const ENCODING: Encoding = Encoding {
-    compression: Compression::ZIP16,
-    blocks: Blocks::ScanLines,
-    line_order: LineOrder::Increasing,
-};
 
 /// What is written beside the pixels.
 #[derive(Clone, Debug, Default)]
@@ -67,7 +57,7 @@ fn replace(path: &Path, write: impl FnOnce(&Path) -> anyhow::Result<()>) -> anyh
 }
 
 /// Linear 0..1 to the nearest sRGB byte (IEC 61966-2-1).
-fn srgb_byte(linear: f32) -> u8 {
+pub(super) fn srgb_byte(linear: f32) -> u8 {
     let x = if linear.is_finite() { linear.clamp(0.0, 1.0) } else { 0.0 };
     let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0).round() as u8
@@ -83,32 +73,18 @@ pub(super) fn write_exr(
     radiance: &[[f32; 3]],
     metadata: &Metadata,
 ) -> anyhow::Result<()> {
-    let size = (extent[0] as usize, extent[1] as usize);
-    let channels = SpecificChannels::rgb(|at: exr::prelude::Vec2<usize>| {
-        let [r, g, b] = radiance.get(at.y() * size.0 + at.x()).copied().unwrap_or([0.0; 3]);
-        (r, g, b)
-    });
-    let mut attributes = LayerAttributes::named("");
-    attributes.layer_name = None;
-    attributes.software_name = Some(Text::from(concat!("caustica ", env!("CARGO_PKG_VERSION"))));
-    let mut note = |name: &str, value: AttributeValue| {
-        attributes.other.insert(Text::from(name), value);
-    };
-    note("caustica.samples", AttributeValue::Text(Text::from(metadata.samples.to_string().as_str())));
-    note(
-        "caustica.sampleOffset",
-        AttributeValue::Text(Text::from(metadata.sample_offset.to_string().as_str())),
-    );
-    note("caustica.seconds", AttributeValue::F64(metadata.seconds));
-    // EXR texts hold Latin-1 only.
-    let device = Text::new_or_none(&metadata.device).unwrap_or_else(|| Text::from("unknown"));
-    note("caustica.device", AttributeValue::Text(device));
-    note("caustica.pipeline", AttributeValue::Text(Text::from(metadata.pipeline)));
-    note("caustica.sampler", AttributeValue::Text(Text::from(metadata.sampler)));
-    note("caustica.seed", AttributeValue::Text(Text::from(metadata.seed.to_string().as_str())));
-    let layer = Layer::new(size, attributes, ENCODING, channels);
-    let image = Image::from_layer(layer);
-    replace(path, |path| Ok(image.write().to_file(path)?))
+    make_folder(path)?;
+    let text = |text: &str| Note::Text(text.to_owned());
+    let notes = [
+        ("caustica.samples", text(&metadata.samples.to_string())),
+        ("caustica.sampleOffset", text(&metadata.sample_offset.to_string())),
+        ("caustica.seconds", Note::Number(metadata.seconds)),
+        ("caustica.device", text(&metadata.device)),
+        ("caustica.pipeline", text(metadata.pipeline)),
+        ("caustica.sampler", text(metadata.sampler)),
+        ("caustica.seed", text(&metadata.seed.to_string())),
+    ];
+    exr_file::write(path, extent, exr_file::channels_of(["R", "G", "B"], radiance).collect(), notes)
 }
 
 fn make_folder(path: &Path) -> anyhow::Result<()> {

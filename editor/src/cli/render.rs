@@ -3,8 +3,6 @@
 mod args;
 mod watch;
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -14,17 +12,15 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use caustica_renderer::delta::LightId;
 use caustica_renderer::{Estimate, Noise, Pipeline, ViewSettings, WakeFn};
-use caustica_scene::Edit;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde_json::json;
 
 pub(super) use args::RenderArgs;
-pub(super) use args::parse_size;
 use args::{settings_of, without_effect};
 
-use super::DeviceArgs;
 use super::output::{self, Kind, Metadata};
-use crate::session::{Loaded, Session, SessionOptions, ViewCamera, environment_argument};
+use super::{DeviceArgs, progress_bar};
+use crate::session::{Loaded, Session, SessionOptions};
 
 /// Frames of which the times are kept for the median.
 const TIMED_FRAMES: usize = 4096;
@@ -61,19 +57,17 @@ pub(super) fn run(
         }))
     });
     let start = Instant::now();
-    let progress = progress_bar(args);
+    let progress = progress_bar(args.json);
     progress.set_message("loading");
-    let loaded = args.sources.load(&args.file, &|step, share| {
+    let loaded = args.shot.load(&|step, share| {
         progress.set_message(step.to_owned());
         progress.set_position((share * 100.0) as u64);
     })?;
-    // A mistake in it is said before a device is opened.
-    args.environment.as_deref().map(environment_argument).transpose()?;
     let device = device.open()?;
     let _watch = DeviceArgs::watch(&device);
     let mut session = Session::new(
         &device,
-        SessionOptions { shaders, watch_shaders, extent: args.size, ..SessionOptions::default() },
+        SessionOptions { shaders, watch_shaders, extent: args.shot.size, ..SessionOptions::default() },
     )?;
     open(&mut session, args, loaded)?;
     let loaded_in = start.elapsed();
@@ -88,33 +82,9 @@ pub(super) fn run(
 
 /// Shows what was loaded as the arguments say.
 fn open(session: &mut Session, args: &RenderArgs, loaded: Loaded) -> anyhow::Result<()> {
-    // What the file does not say is as at the start, whatever was shown before.
-    session.set_settings(ViewSettings::default());
-    session.open_at(&args.file, loaded, args.at)?;
-    if args.at.is_some() && session.duration().is_none() {
-        bail!("{}: --at was given, but no clip of it is played: nothing is animated", args.file.display());
-    }
-    if let Some(environment) = &args.environment {
-        session.push(Edit::SetEnvironment(environment_argument(environment)?))?;
-    }
+    args.shot.open(session, loaded)?;
     if session.document().is_source(&args.output) {
         bail!("{}: is a source of this scene; choose another name", args.output.display());
-    }
-    if let Some(name) = &args.scene {
-        choose_scene(session, name).with_context(|| args.file.display().to_string())?;
-        let aspect = f64::from(args.size[0]) / f64::from(args.size[1]);
-        session.set_camera(ViewCamera::of_document(session.document(), None, aspect));
-    }
-    if let Some(name) = &args.variant {
-        choose_variant(session, name).with_context(|| args.file.display().to_string())?;
-    }
-    if let Some(name) = &args.camera {
-        if session.document().find_camera(name).is_none() {
-            let known = session.document().camera_names();
-            let known = if known.is_empty() { String::from("the file has none") } else { known.join(", ") };
-            bail!("{}: no camera '{name}'; there is: {known}", args.file.display());
-        }
-        session.set_camera(ViewCamera::of_document(session.document(), Some(name), 1.0));
     }
     let show_light = args.show_light.as_deref().map(|name| light_of(session, name)).transpose()?;
     let settings = settings_of(args, session.settings().clone());
@@ -138,7 +108,8 @@ fn picture(
     loaded_in: Duration,
 ) -> anyhow::Result<()> {
     let device = Arc::clone(session.device());
-    let run = accumulate(session, args, progress).map_err(|error| session.advise_size(args.size, error))?;
+    let run =
+        accumulate(session, args, progress).map_err(|error| session.advise_size(args.shot.size, error))?;
     progress.finish_and_clear();
     let metadata = Metadata {
         samples: run.samples,
@@ -156,8 +127,8 @@ fn picture(
     // Frames that share their past do not tell how far they are from the truth.
     let noise = if denoised { None } else { Noise::of(&accumulated) };
     match kind {
-        Kind::Exr => output::write_exr(&args.output, args.size, &accumulated.mean, &metadata)?,
-        Kind::Png => output::write_png(&args.output, args.size, &session.read_display()?)?,
+        Kind::Exr => output::write_exr(&args.output, args.shot.size, &accumulated.mean, &metadata)?,
+        Kind::Png => output::write_png(&args.output, args.shot.size, &session.read_display()?)?,
     }
     report_validation(&device)?;
     if args.json {
@@ -166,8 +137,8 @@ fn picture(
         say!(
             "{}: {}x{}, {} samples in {:.2} s ({}), noise {}{}, {}",
             args.output.display(),
-            args.size[0],
-            args.size[1],
+            args.shot.size[0],
+            args.shot.size[1],
             metadata.samples,
             metadata.seconds,
             metadata.pipeline,
@@ -181,44 +152,6 @@ fn picture(
         );
     }
     Ok(())
-}
-
-/// Shows the scene of this name, or number from 1, of all instances whose file has it.
-fn choose_scene(session: &mut Session, name: &str) -> anyhow::Result<()> {
-    let document = session.document();
-    let number = name.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
-    let (mut edits, mut known) = (Vec::new(), BTreeSet::new());
-    for (node, prefab) in
-        document.nodes().filter_map(|(id, node)| Some((id, document.prefab(node.prefab()?)?)))
-    {
-        let names = prefab.scene_names();
-        let scene = names.iter().find(|known| *known == name).or_else(|| names.get(number?));
-        edits.extend(scene.cloned().map(|scene| Edit::SetScene { node, scene: Some(scene) }));
-        known.extend(names);
-    }
-    if edits.is_empty() {
-        let known: Vec<String> = known.into_iter().collect();
-        let known = if known.is_empty() { String::from("the file has none") } else { known.join(", ") };
-        bail!("no scene '{name}'; there is: {known}");
-    }
-    Ok(session.push(Edit::batch("chose a scene", edits))?)
-}
-
-/// Shows all instances that have a variant of materials of this name in it.
-fn choose_variant(session: &mut Session, name: &str) -> anyhow::Result<()> {
-    let document = session.document();
-    let variants: BTreeMap<_, _> = document.prefabs().map(|(id, prefab)| (id, prefab.variants())).collect();
-    let has_it = |prefab| variants.get(&prefab).is_some_and(|known| known.iter().any(|known| known == name));
-    let instances = document.nodes().filter(|(_, node)| node.prefab().is_some_and(has_it));
-    let choose = |node| Edit::SetVariant { node, variant: Some(name.to_owned()) };
-    let edits: Vec<Edit> = instances.map(|(id, _)| choose(id)).collect();
-    if edits.is_empty() {
-        let known: BTreeSet<String> = variants.into_values().flatten().collect();
-        let known: Vec<String> = known.into_iter().collect();
-        let known = if known.is_empty() { String::from("the scene has none") } else { known.join(", ") };
-        bail!("no variant '{name}'; there is: {known}");
-    }
-    Ok(session.push(Edit::batch("chose a variant", edits))?)
 }
 
 /// Messages of the validation layer are an error of ours: they are never silent.
@@ -258,7 +191,7 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     let mut done = 0;
     let mut can_be_read = false;
     while (done < samples || session.textures_settle()) && in_time(done) {
-        let recorder = session.begin_frame(args.size)?;
+        let recorder = session.begin_frame(args.shot.size)?;
         session.submit(recorder, None)?;
         let times = &session.statistics().passes;
         if frames.len() < TIMED_FRAMES && !times.is_empty() {
@@ -312,12 +245,12 @@ fn summary(
         statistics.memory.iter().map(|(kind, bytes)| (kind.clone(), json!(bytes))).collect();
     json!({
         "output": args.output,
-        "size": args.size,
+        "size": args.shot.size,
         "pipeline": metadata.pipeline,
         "sampler": metadata.sampler,
         "device": metadata.device,
         "device_profile": profile.map_or_else(|| String::from("default"), |file| file.display().to_string()),
-        "at": args.at,
+        "at": args.shot.at,
         "version": env!("CARGO_PKG_VERSION"),
         "samples": metadata.samples,
         "sample_offset": metadata.sample_offset,
@@ -355,17 +288,4 @@ fn medians(frames: &[Vec<(String, f64)>]) -> Vec<(String, f64)> {
             (label.clone(), times[times.len() / 2])
         })
         .collect()
-}
-
-fn progress_bar(args: &RenderArgs) -> ProgressBar {
-    if args.json || !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let bar = ProgressBar::new(100);
-    if let Ok(style) =
-        ProgressStyle::with_template("{msg:12} [{bar:40}] {pos}/{len} {elapsed} (about {eta} left)")
-    {
-        bar.set_style(style);
-    }
-    bar
 }

@@ -231,6 +231,11 @@ impl Session {
         total_ms(&self.statistics().passes)
     }
 
+    /// Milliseconds of all passes of all frames known to have finished; after [`Self::finish`] those of all.
+    pub fn total_device_ms(&self) -> f64 {
+        self.frames.total_ms()
+    }
+
     /// What all frames did together.
     pub fn tally(&self) -> &Tally {
         &self.tally

@@ -25,6 +25,8 @@ struct Slot {
     staging: Option<Staging>,
     timers: Option<Timers>,
     tag: u64,
+    /// Its times are in the sum.
+    counted: bool,
 }
 
 /// What a finished frame tells.
@@ -42,6 +44,7 @@ pub struct Frames {
     slots: Vec<Slot>,
     next: usize,
     finished: FrameResult,
+    total_ms: f64,
 }
 
 impl Frames {
@@ -51,7 +54,13 @@ impl Frames {
     /// When the driver refuses.
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         let slots = (0..IN_FLIGHT).map(|_| create_slot(device)).collect::<Result<Vec<_>>>()?;
-        Ok(Self { device: Arc::clone(device), slots, next: 0, finished: FrameResult::default() })
+        Ok(Self {
+            device: Arc::clone(device),
+            slots,
+            next: 0,
+            finished: FrameResult::default(),
+            total_ms: 0.0,
+        })
     }
 
     /// How many frames may be in flight; `Recorder::slot` is below it.
@@ -154,7 +163,7 @@ impl Frames {
             tracker.commit();
         }
         device.submitted.store(value, Ordering::Release);
-        self.slots[index].value = value;
+        (self.slots[index].value, self.slots[index].counted) = (value, false);
         self.next = (index + 1) % IN_FLIGHT;
         Ok(value)
     }
@@ -187,6 +196,11 @@ impl Frames {
         &self.finished
     }
 
+    /// Milliseconds of all passes of all submits known to have finished.
+    pub fn total_ms(&self) -> f64 {
+        self.total_ms
+    }
+
     fn finish_slot(&mut self, index: usize) -> Result<()> {
         let value = self.slots[index].value;
         if value == 0 {
@@ -196,6 +210,9 @@ impl Frames {
         waited.map_err(|error| self.device.name_the_pass(error))?;
         if let Some(timers) = &self.slots[index].timers {
             let passes = timers.read();
+            if !std::mem::replace(&mut self.slots[index].counted, true) {
+                self.total_ms += passes.iter().map(|pass| pass.ms).sum::<f64>();
+            }
             if !passes.is_empty() {
                 self.finished = FrameResult { passes, tag: self.slots[index].tag };
             }
@@ -226,5 +243,5 @@ fn create_slot(device: &Arc<Device>) -> Result<Slot> {
     // SAFETY: the pool is alive; the buffer dies with it.
     let command =
         unsafe { device.raw.allocate_command_buffers(&info) }.during("vkAllocateCommandBuffers")?[0];
-    Ok(Slot { pool, command, value: 0, staging: None, timers: None, tag: 0 })
+    Ok(Slot { pool, command, value: 0, staging: None, timers: None, tag: 0, counted: false })
 }

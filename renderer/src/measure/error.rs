@@ -10,7 +10,7 @@ pub const RELATIVE_EPSILON: f64 = 0.01;
 /// Share of the pixels, those with the largest error, that the trimmed forms leave out.
 const TRIMMED_SHARE: f64 = 0.001;
 /// Side of the blocks whose means are compared: what is left there is mostly bias, pixels.
-const BLOCK: usize = 8;
+pub(super) const BLOCK: usize = 8;
 /// Luminance of linear Rec.709.
 pub(crate) const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 

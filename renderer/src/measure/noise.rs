@@ -7,7 +7,7 @@ use super::error::RELATIVE_EPSILON;
 use crate::renderer::Accumulated;
 
 /// Standard errors in an interval that holds 95 of 100.
-const STANDARD_ERRORS: f64 = 1.96;
+pub(super) const STANDARD_ERRORS: f64 = 1.96;
 /// Part of the relative noise that the estimate may be off by, as noise that is not symmetrical hides in the brightness that it is
 /// measured by. It falls as fast as the noise itself (`tests/tests/noise.rs`).
 const SKEW: f64 = 0.5;

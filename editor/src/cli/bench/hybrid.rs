@@ -3,9 +3,10 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use caustica_renderer::gpu::DeviceKind;
-use caustica_renderer::{Pipeline, Primary, ReflectionRate, ShadowRate, ViewSettings};
+use caustica_renderer::{
+    ErrorMetrics, Pipeline, Primary, Radiance, ReflectionRate, ShadowRate, ViewSettings,
+};
 use clap::Args;
 use serde::Serialize;
 use serde_json::json;
@@ -13,7 +14,7 @@ use serde_json::json;
 use super::series::{Series, Spread, passes_ms};
 use super::table::{Table, times};
 use super::{Bench, Measured};
-use crate::cli::render::parse_size;
+use crate::cli::shot::parse_size;
 use crate::session::{Session, SessionOptions, load};
 
 /// Frames that are timed for each picture on a card: long enough for its clocks to rise.
@@ -161,7 +162,8 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
             let timed = if on_processor || bench.quick { samples } else { TIMED_FRAMES };
             time_frames(&mut session, extent_px, timed, tally)?;
             tally.shadow_rays = [0, 1].map(|i| tally.shadow_rays[i] + picture.shadow_rays[i]);
-            tally.compare(&reference, &picture.mean, rounds)?;
+            let picture = Radiance::new(extent_px, &picture.mean)?;
+            tally.compare(&Radiance::new(extent_px, &reference)?, &picture, rounds)?;
             bar.inc(1);
         }
     }
@@ -229,39 +231,19 @@ impl Tally {
     }
 
     /// Adds the error of one of `rounds` pictures.
-    fn compare(&mut self, reference: &[[f32; 3]], mean: &[[f32; 3]], rounds: u32) -> anyhow::Result<()> {
-        let error = error_of(reference, mean).context("pictures of different sizes, or none")?;
+    fn compare(
+        &mut self,
+        reference: &Radiance<'_>,
+        picture: &Radiance<'_>,
+        rounds: u32,
+    ) -> anyhow::Result<()> {
+        let error = ErrorMetrics::of(reference, picture)?;
         let share = 1.0 / f64::from(rounds);
         self.error.rel_mse += share * error.rel_mse;
-        self.error.rel_mse_999 += share * error.rel_mse_999;
-        self.error.luminance += share * error.luminance;
+        self.error.rel_mse_999 += share * error.rel_mse_trimmed;
+        self.error.luminance += share * error.luminance_ratio;
         Ok(())
     }
-}
-
-/// `None` where the pictures differ in size, or hold nothing.
-fn error_of(reference: &[[f32; 3]], mean: &[[f32; 3]]) -> Option<Error> {
-    let wide = |pixel: &[f32; 3]| pixel.map(f64::from);
-    let of_pixel = |(r, x): (&[f32; 3], &[f32; 3])| {
-        let terms = wide(r).into_iter().zip(wide(x)).map(|(r, x)| (x - r) * (x - r) / (r * r + 0.01));
-        terms.sum::<f64>() / 3.0
-    };
-    let luminance = |image: &[[f32; 3]]| {
-        let [r, g, b] = image.iter().map(wide).fold([0.0; 3], |sum, x| [0, 1, 2].map(|i| sum[i] + x[i]));
-        0.2126 * r + 0.7152 * g + 0.0722 * b
-    };
-    let mut errors: Vec<f64> = reference.iter().zip(mean).map(of_pixel).collect();
-    if reference.len() != mean.len() || errors.is_empty() {
-        return None;
-    }
-    errors.sort_by(f64::total_cmp);
-    let kept = errors.len() - errors.len() / 1000;
-    let mean_of = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
-    Some(Error {
-        rel_mse: mean_of(&errors),
-        rel_mse_999: mean_of(&errors[..kept]),
-        luminance: luminance(mean) / luminance(reference),
-    })
 }
 
 fn rows(tallies: &[Tally]) -> Vec<Row> {
@@ -309,21 +291,4 @@ fn error_table(title: &str, rows: &[Row]) -> Table {
     }
     table.note("relMSE: mean of (x - r)^2 / (r^2 + 0.01); luminance by that of the reference.");
     table
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_wrong_pixel_of_a_thousand_is_the_worst() {
-        let reference = vec![[1.0; 3]; 1000];
-        let mut mean = vec![[1.1; 3]; 1000];
-        mean[7] = [11.0; 3];
-        let error = error_of(&reference, &mean).unwrap_or_default();
-        assert!((error.rel_mse_999 - 0.01 / 1.01).abs() < 1e-6, "{error:?}");
-        assert!((error.rel_mse - (0.999 * 0.01 + 0.1) / 1.01).abs() < 1e-6, "{error:?}");
-        assert!((error.luminance - 1.1099).abs() < 1e-6, "{error:?}");
-        assert!(error_of(&reference, &mean[1..]).is_none() && error_of(&[], &[]).is_none());
-    }
 }

@@ -8,24 +8,20 @@ use caustica_renderer::{
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use crate::cli::{SourceArgs, output};
+use crate::cli::output;
+use crate::cli::shot::{ShotArgs, parse_positive};
 
 /// Arguments of `caustica render`.
 #[derive(Args, Debug)]
 pub(in crate::cli) struct RenderArgs {
-    /// A project, .gltf, .glb or .obj
-    pub(super) file: PathBuf,
     #[command(flatten)]
-    pub(super) sources: SourceArgs,
+    pub(in crate::cli) shot: ShotArgs,
     /// Where the image goes: .png (tone mapped) or .exr (radiance)
     #[arg(short, long, value_name = "OUT", value_parser = parse_output)]
     pub(super) output: PathBuf,
     /// How the image is made
     #[arg(long, value_enum)]
     pipeline: Option<PipelineArg>,
-    /// Size in pixels
-    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1280x720")]
-    pub(super) size: [u32; 2],
     /// Samples a pixel. Of samples, time and target error whatever is reached first counts
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) samples: Option<u64>,
@@ -35,21 +31,6 @@ pub(in crate::cli) struct RenderArgs {
     /// Stop at this noise: sqrt(relMSE) estimated from two independent streams, 0.01 is 1 %
     #[arg(long, value_name = "X", value_parser = parse_positive)]
     pub(super) target_error: Option<f64>,
-    /// Show the scene at this time of its animation; past the end of a clip it begins again. Without it: at rest
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
-    pub(super) at: Option<f64>,
-    /// Name of the camera; the n-th of one name is NAME#n
-    #[arg(long)]
-    pub(super) camera: Option<String>,
-    /// Show this scene of the file: its name, or its number from 1
-    #[arg(long, value_name = "NAME|INDEX")]
-    pub(super) scene: Option<String>,
-    /// Show every instance that has it in this variant of materials (KHR_materials_variants)
-    #[arg(long, value_name = "NAME")]
-    pub(super) variant: Option<String>,
-    /// An environment map (.hdr, .exr), or a constant radiance R,G,B
-    #[arg(long, value_name = "FILE|R,G,B")]
-    pub(super) environment: Option<String>,
     /// Where random numbers come from. A Hammersley set is made for half of --samples, as there are two streams; without
     /// --samples, for 256
     #[arg(long, value_enum)]
@@ -199,33 +180,10 @@ pub(super) fn without_effect(args: &RenderArgs, settings: &ViewSettings) -> Vec<
     list.into_iter().filter(|(given, _)| *given).map(|(_, what)| what).collect()
 }
 
-pub(in crate::cli) fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
-    let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));
-    match [side(width)?, side(height)?] {
-        [0, _] | [_, 0] => Err(String::from("a side of 0 pixels")),
-        size => Ok(size),
-    }
-}
-
-fn parse_positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
-        _ => Err(String::from("expected a number above 0")),
-    }
-}
-
 fn parse_finite(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(x) if x.is_finite() => Ok(x),
         _ => Err(String::from("expected a number")),
-    }
-}
-
-fn parse_seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
-        _ => Err(String::from("expected a number of seconds, 0 or more")),
     }
 }
 

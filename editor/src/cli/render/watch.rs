@@ -23,8 +23,8 @@ pub(super) fn follow(
 ) -> anyhow::Result<()> {
     let shaders = session.shader_folder();
     let shaders = shaders.map_or_else(|| String::from("no shaders"), |folder| folder.display().to_string());
-    eprintln!("watching {} and {shaders} (end with Ctrl+C)", args.file.display());
-    let mut files = Files::of(session, &args.file);
+    eprintln!("watching {} and {shaders} (end with Ctrl+C)", args.shot.file.display());
+    let mut files = Files::of(session, &args.shot.file);
     let (mut had_faults, mut is_open) = (false, true);
     loop {
         match woken.recv_timeout(LOOK_EVERY) {
@@ -42,14 +42,13 @@ pub(super) fn follow(
         had_faults = has_faults;
         let start = Instant::now();
         if files.have_changed() {
-            let opened =
-                args.sources.load(&args.file, &|_, _| {}).and_then(|loaded| open(session, args, loaded));
+            let opened = args.shot.load(&|_, _| {}).and_then(|loaded| open(session, args, loaded));
             is_open = opened.is_ok();
             is_due |= is_open;
             if let Err(error) = opened {
                 eprintln!("error: {error:#}; the last picture stays");
             }
-            files = Files::of(session, &args.file);
+            files = Files::of(session, &args.shot.file);
         }
         if is_due && is_open {
             picture(session, start.elapsed())?;

@@ -1,0 +1,196 @@
+//! Renders what a report compares. Enters: a session, settings, a reference. Leaves: curves and last pictures.
+
+use std::time::{Duration, Instant};
+
+use caustica_renderer::{
+    Accumulated, ErrorMetrics, Halves, Radiance, Split, ViewSettings, flip_hdr, flip_ldr,
+};
+use indicatif::ProgressBar;
+
+use crate::curve::{Curve, Point};
+use crate::reference::settings_of_truth;
+use crate::session::Session;
+
+/// In turns, so that all of them have the machine's better and worse moments.
+const ROUNDS: usize = 5;
+/// How long one turn is at least.
+const TURN: Duration = Duration::from_millis(200);
+
+/// When to stop, whichever is first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Until {
+    pub(super) samples: u64,
+    pub(super) seconds: f64,
+}
+
+/// The curve of one choice, and its last picture.
+#[derive(Debug)]
+pub(super) struct Measured {
+    pub(super) curve: Curve,
+    pub(super) picture: Accumulated,
+}
+
+/// Where a run stood when its picture was read.
+struct Stop {
+    samples: u64,
+    gpu_ms: f64,
+    wall_s: f64,
+    picture: Accumulated,
+}
+
+/// The path tracer's picture for what the session shows.
+pub(super) fn reference(
+    session: &mut Session,
+    extent: [u32; 2],
+    samples: u64,
+    progress: &ProgressBar,
+) -> anyhow::Result<Accumulated> {
+    let settings = settings_of_truth(session.settings());
+    begin(session, &settings, extent)?;
+    progress.set_length(samples);
+    while session.samples() < samples {
+        frame(session, extent)?;
+        progress.set_position(session.samples());
+    }
+    session.read_back()
+}
+
+/// Renders a choice, looks at it whenever its samples have doubled, and compares.
+pub(super) fn measure(
+    session: &mut Session,
+    settings: &ViewSettings,
+    reference: &Accumulated,
+    until: Until,
+    progress: &ProgressBar,
+) -> anyhow::Result<Measured> {
+    let extent = reference.extent;
+    // Frames that share their past tell nothing of their noise: a second run with other random numbers does.
+    let halves = if settings.denoise_stills { Halves::Runs } else { Halves::Streams };
+    let first = if halves == Halves::Runs { 1 } else { 2 };
+    let mut stops = run(session, settings, extent, first, until, progress)?;
+    let others = match halves {
+        Halves::Streams => Vec::new(),
+        Halves::Runs => {
+            let samples = stops.last().map_or(first, |stop| stop.samples);
+            let again = ViewSettings { seed: settings.seed.wrapping_add(1), ..settings.clone() };
+            let whole = Until { samples, seconds: f64::INFINITY };
+            run(session, &again, extent, first, whole, progress)?
+        }
+    };
+    let exposure = settings.exposure_ev.exp2();
+    let mut points = Vec::new();
+    for (number, stop) in stops.iter().enumerate() {
+        let pair = others.get(number).map(|other| pair(&stop.picture, &other.picture));
+        let split = Split::of(reference, pair.as_ref().unwrap_or(&stop.picture), halves)?;
+        points.push(point(reference, stop, split, exposure)?);
+    }
+    let picture = stops.pop().map_or_else(|| reference.clone(), |stop| stop.picture);
+    Ok(Measured { curve: Curve(points), picture })
+}
+
+fn point(reference: &Accumulated, stop: &Stop, split: Split, exposure: f32) -> anyhow::Result<Point> {
+    let [truth, seen] = [reference, &stop.picture].map(|image| Radiance::new(image.extent, &image.mean));
+    let (truth, seen) = (truth?, seen?);
+    Ok(Point {
+        samples: stop.samples,
+        gpu_ms: stop.gpu_ms,
+        wall_s: stop.wall_s,
+        metrics: ErrorMetrics::of(&truth, &seen)?,
+        flip: flip_ldr(&truth, &seen, exposure)?.mean,
+        flip_hdr: flip_hdr(&truth, &seen)?.map(|flip| flip.mean),
+        split,
+    })
+}
+
+/// Two runs as halves of one picture.
+fn pair(a: &Accumulated, b: &Accumulated) -> Accumulated {
+    let of = |combine: fn(f32, f32) -> f32| {
+        let pixels = a.mean.iter().zip(&b.mean);
+        pixels.map(|(a, b)| [0, 1, 2].map(|i| combine(a[i], b[i]))).collect()
+    };
+    Accumulated {
+        extent: a.extent,
+        samples: a.samples,
+        mean: of(|a, b| (a + b) * 0.5),
+        half_difference: of(|a, b| (a - b) * 0.5),
+    }
+}
+
+/// Renders from the first sample on and stops at `first`, and whenever there are twice as many.
+fn run(
+    session: &mut Session,
+    settings: &ViewSettings,
+    extent: [u32; 2],
+    first: u64,
+    until: Until,
+    progress: &ProgressBar,
+) -> anyhow::Result<Vec<Stop>> {
+    begin(session, settings, extent)?;
+    progress.set_length(until.samples);
+    let before_ms = session.total_device_ms();
+    let (mut stops, mut wall_s, mut next) = (Vec::new(), 0.0, first);
+    loop {
+        let start = Instant::now();
+        while session.samples() < next {
+            frame(session, extent)?;
+            progress.set_position(session.samples());
+        }
+        session.finish()?;
+        wall_s += start.elapsed().as_secs_f64();
+        let gpu_ms = session.total_device_ms() - before_ms;
+        stops.push(Stop { samples: next, gpu_ms, wall_s, picture: session.read_back()? });
+        // The next stop takes as long again.
+        if next >= until.samples || wall_s * 2.0 > until.seconds {
+            return Ok(stops);
+        }
+        next = (next * 2).min(until.samples);
+    }
+}
+
+/// Shows the settings, with pipelines made and textures in place, at the first sample.
+fn begin(session: &mut Session, settings: &ViewSettings, extent: [u32; 2]) -> anyhow::Result<()> {
+    session.set_settings(settings.clone());
+    loop {
+        frame(session, extent)?;
+        session.finish()?;
+        if !session.textures_settle() && !session.builds_in_background() {
+            break;
+        }
+    }
+    // Begins anew, without the past of other settings.
+    session.set_sample_offset(0)
+}
+
+fn frame(session: &mut Session, extent: [u32; 2]) -> anyhow::Result<()> {
+    let recorder = session.begin_frame(extent)?;
+    session.submit(recorder, None)
+}
+
+/// Median milliseconds of a sample of each, in turns.
+pub(super) fn ms_per_sample(
+    session: &mut Session,
+    all: &[ViewSettings],
+    extent: [u32; 2],
+    progress: &ProgressBar,
+) -> anyhow::Result<Vec<f64>> {
+    let mut times = vec![Vec::new(); all.len()];
+    progress.set_length(ROUNDS as u64);
+    for _ in 0..ROUNDS {
+        for (settings, times) in all.iter().zip(&mut times) {
+            begin(session, settings, extent)?;
+            let (start, before_ms) = (Instant::now(), session.total_device_ms());
+            while session.samples() == 0 || start.elapsed() < TURN {
+                frame(session, extent)?;
+            }
+            session.finish()?;
+            times.push((session.total_device_ms() - before_ms) / session.samples() as f64);
+        }
+        progress.inc(1);
+    }
+    Ok(times.into_iter().map(middle).collect())
+}
+
+fn middle(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

@@ -17,7 +17,7 @@ pub struct Point {
     pub metrics: ErrorMetrics,
     /// Mean of FLIP of what is shown, 0 to 1.
     pub flip: f64,
-    /// Mean of HDR-FLIP; `None`: the reference has no median exposure.
+    /// Mean of HDR-FLIP, of the last point alone; `None`: the reference has no median exposure.
     pub flip_hdr: Option<f64>,
     /// Noise and bias.
     pub split: Split,

@@ -34,6 +34,8 @@ pub enum Wish {
     Source(PrefabId),
     /// An image to surround the scene.
     Environment,
+    /// A picture to compare with.
+    Reference,
     /// Where to write the project.
     SaveAs,
     /// Where to write the scene as glTF.
@@ -47,6 +49,7 @@ impl Wish {
             Self::Import => "Import into the scene",
             Self::Source(_) => "Choose another source",
             Self::Environment => "Choose an environment image",
+            Self::Reference => "Choose a picture to compare with",
             Self::SaveAs => "Save the project as",
             Self::Export => "Export the scene as glTF",
         }
@@ -58,6 +61,7 @@ impl Wish {
             Self::Import => ("Models", [&MODEL_ENDINGS[..], &SHAPE_ENDINGS, &["json"]].concat()),
             Self::Source(_) => ("Models", MODEL_ENDINGS.to_vec()),
             Self::Environment => ("Environments", ENVIRONMENT_ENDINGS.to_vec()),
+            Self::Reference => ("Pictures", vec!["exr"]),
             Self::SaveAs => ("Caustica projects", vec!["json"]),
             Self::Export => ("glTF", EXPORT_ENDINGS.to_vec()),
         }

@@ -8,6 +8,7 @@ mod curve;
 mod default_sky;
 mod device_watch;
 mod dialogs;
+mod error_watch;
 mod exr_file;
 mod gizmo;
 pub mod history;

@@ -13,6 +13,7 @@ pub mod acceleration;
 pub mod bars;
 mod code;
 pub mod environment;
+pub mod error;
 pub mod inspector;
 pub mod material;
 mod material_lobes;

@@ -6,6 +6,7 @@ mod files;
 mod frame;
 mod host_times;
 mod inventory;
+mod measuring;
 mod room;
 mod tally;
 mod view_size;
@@ -83,6 +84,7 @@ pub struct Session {
     profile: ProfileInForce,
     tally: Tally,
     host_times: HostTimes,
+    measuring: measuring::Measuring,
     device: Arc<Device>,
 }
 
@@ -134,6 +136,7 @@ impl Session {
             profile,
             tally: Tally::default(),
             host_times: HostTimes::default(),
+            measuring: measuring::Measuring::default(),
             device: Arc::clone(device),
         })
     }

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use caustica_scene::{Finding, MeshId, NodeId, Target};
 
 use crate::app::actions::Action;
+use crate::error_watch::ErrorWatch;
 use crate::gizmo::{Drag, Handle, Motion, Space, Start, Tool};
 use crate::log_buffer::LogBuffer;
 use crate::playback::Playback;
@@ -225,6 +226,8 @@ pub struct UiState {
     pub log: LogBuffer,
     /// The latest audit.
     pub health: Option<Health>,
+    /// The error of the picture.
+    pub error: ErrorWatch,
     /// Smoothed milliseconds of each pass.
     pub pass_ms: BTreeMap<String, f64>,
 }

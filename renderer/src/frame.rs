@@ -29,6 +29,7 @@ pub(crate) fn record(
     needs: Needs,
 ) -> Result<()> {
     view.prepare_targets(needs)?;
+    view.prepare_measuring(recorder)?;
     let what = view.accumulation.take_pending();
     if what != Invalidation::Nothing {
         view.bands.abandon();
@@ -77,6 +78,12 @@ pub(crate) fn record(
     }
     if band.last && !plan.moving {
         passes.accumulate.record(recorder, &scope, targets, accumulator, &view.counters.device)?;
+        if let (Some(pass), Some(blocks)) = (&passes.error, view.measuring.blocks(scope.extent)) {
+            let reference = view.measuring.reference(scope.extent);
+            pass.record(recorder, &scope, accumulator, reference, blocks)?;
+            let (samples, resets) = (view.accumulation.samples() + 1, view.accumulation.resets());
+            view.measuring.copy(recorder, samples, resets)?;
+        }
     }
     let shown_history = if plan.denoised { filled } else { view.history.unwrap_or(filled) };
     // In the middle of a sample the display is made again only when the way it is shown has changed.
@@ -93,6 +100,7 @@ pub(crate) fn record(
             parity,
             history: shown_history,
             added: band.last && !plan.moving,
+            reference: view.measuring.reference(scope.extent),
         };
         passes.post.record(recorder, &scope, targets, accumulator, &shown)?;
         displayed = Some(display);
@@ -206,6 +214,8 @@ fn frame_constants(
         accumulator: view.accumulator.as_ref().map_or(0, caustica_gpu::Buffer::address),
         sample_index,
         selection,
+        reference: view.measuring.reference(extent).map_or(0, caustica_gpu::Buffer::address),
+        error_blocks: view.measuring.blocks(extent).map_or(0, caustica_gpu::Buffer::address),
         ggx_albedo: if settings.multiple_scattering { tables.ggx_albedo_address() } else { 0 },
         seed: settings.seed,
         flags,
@@ -242,4 +252,5 @@ pub(crate) fn read_counters(view: &mut View, slot: usize) {
         view.statistics.non_finite = u64::from(counters.non_finite);
         view.statistics.shadow_rays = u64::from(counters.shadow_rays);
     }
+    view.note_error(slot);
 }

@@ -49,15 +49,17 @@ macro_rules! twins {
 }
 
 mod constants;
+mod error;
 mod material;
 
 pub use constants::*;
+pub use error::{ErrorBlock, ReferencePixel};
 pub use material::{Material, MaterialLobes, TextureUse};
 
 /// Every struct shared with GLSL.
 #[must_use]
 pub fn twins() -> &'static [Twin] {
-    static ALL: LazyLock<Vec<Twin>> = LazyLock::new(|| [TWINS, material::TWINS].concat());
+    static ALL: LazyLock<Vec<Twin>> = LazyLock::new(|| [TWINS, error::TWINS, material::TWINS].concat());
     &ALL
 }
 
@@ -221,7 +223,7 @@ twins! {
     }
 
     /// One view's constants for one frame.
-    struct Frame, size 376 {
+    struct Frame, size 392 {
         /// Jittered, by columns; reverse depth: 1 at the near plane, 0 at infinity.
         0 clip_from_render: [f32; 16],
         /// The same without jitter.
@@ -250,36 +252,40 @@ twins! {
         296 sample_index: u64,
         /// Device address of a bit set by instance slot: the outlined ones; 0: nothing is selected.
         304 selection: u64,
+        /// Device address of [`ReferencePixel`] by row, of the size of the picture; 0: there is none.
+        312 reference: u64,
+        /// Device address of [`ErrorBlock`] by row; 0 unless pass error runs.
+        320 error_blocks: u64,
         /// Device address of the table of `lib/ggx_albedo.glsl`; 0: light is reflected once by rough surfaces.
-        312 ggx_albedo: u64,
+        328 ggx_albedo: u64,
         /// Seed of all random numbers.
-        320 seed: u32,
+        336 seed: u32,
         /// `FRAME_*` bits.
-        324 flags: u32,
+        340 flags: u32,
         /// Lights a pixel; all of them when there are at most this many.
-        328 light_samples: u32,
+        344 light_samples: u32,
         /// Shadow rays a light and pixel, at least 1.
-        332 shadow_rays: u32,
+        348 shadow_rays: u32,
         /// Reflections and refractions after the first surface.
-        336 max_depth: u32,
+        352 max_depth: u32,
         /// `TONE_MAP_*`.
-        340 tone_map: u32,
+        356 tone_map: u32,
         /// Surfaces up to this roughness trace their specular lobe.
-        344 reflection_roughness_max: f32,
+        360 reflection_roughness_max: f32,
         /// Upper bound on the history length while moving, frames.
-        348 temporal_max_history: f32,
+        364 temporal_max_history: f32,
         /// Which block of its stream this sample belongs to.
-        352 block_index: u32,
+        368 block_index: u32,
         /// 1 when this sample is the first of its block.
-        356 block_start: u32,
+        372 block_start: u32,
         /// 1 when this sample is the last of its block.
-        360 block_end: u32,
+        376 block_end: u32,
         /// Samples in the accumulator before this frame; 0: it is overwritten.
-        364 accumulated: u32,
+        380 accumulated: u32,
         /// Instance slots that the bit set of `selection` covers.
-        368 selection_count: u32,
+        384 selection_count: u32,
         /// Zero.
-        372 pad0: u32,
+        388 pad0: u32,
     }
 
     /// What the device counts in a frame.

@@ -25,9 +25,9 @@ pub use caustica_gpu as gpu;
 pub use error::{RendererError, Result};
 pub use inventory::{EnvironmentEntry, InstanceEntry, Inventory, Layout, MaterialEntry, MeshEntry, Place};
 pub use measure::{
-    AccelBench, AccelStatistics, BareStructure, BlasTimes, DeviceProfile, ErrorMetrics, Estimate, Flip,
-    Halves, LeftOut, Noise, PrimaryTimes, ProfileInForce, Radiance, Split, Statistics, TlasTimes, TlasWork,
-    flip_hdr, flip_ldr, relative_error_map,
+    AccelBench, AccelStatistics, Against, BareStructure, BlasTimes, DeviceProfile, ErrorMetrics, Estimate,
+    Flip, Halves, LeftOut, LiveError, Noise, PrimaryTimes, ProfileInForce, Radiance, Split, Statistics,
+    TlasTimes, TlasWork, flip_hdr, flip_ldr, relative_error_map,
 };
 pub use needs::{Needs, SceneSummary, SurfaceSummary};
 pub use renderer::{Accumulated, PickHit, Renderer, RendererOptions, WakeFn};

@@ -6,6 +6,7 @@ mod blas_surface;
 mod deferred;
 mod deform;
 mod denoise;
+mod error;
 mod gbuffer;
 mod instance_descriptors;
 mod light_shadow;
@@ -30,6 +31,7 @@ pub(crate) use blas_surface::BlasSurface;
 pub(crate) use deferred::Deferred;
 pub(crate) use deform::Deform;
 pub(crate) use denoise::{Denoise, Moving};
+pub(crate) use error::MeasureError;
 pub(crate) use gbuffer::GBuffer;
 pub(crate) use instance_descriptors::{DescriptorAddresses, InstanceDescriptors};
 pub(crate) use light_shadow::LightShadow;
@@ -47,6 +49,7 @@ use crate::needs::Needs;
 use crate::settings::Show;
 use crate::shader::{Live, Owner, ShaderLibrary, StageOf, merge_interfaces};
 use crate::tables::Tables;
+use crate::view::View;
 use ray_pipeline::RayFiles;
 
 /// Builds pipelines for one set of needs.
@@ -266,6 +269,8 @@ pub(crate) struct PassSet {
     /// Made when it is shown for the first time.
     pub(crate) light_shadow: Option<LightShadow>,
     pub(crate) post: Post,
+    /// Made when something is measured for the first time.
+    pub(crate) error: Option<MeasureError>,
     /// Of all its pipelines.
     pub(crate) owner: Arc<Owner>,
 }
@@ -282,15 +287,20 @@ impl PassSet {
             accumulate: Accumulate::new(builder)?,
             light_shadow: None,
             post: Post::new(builder)?,
+            error: None,
             owner: Arc::clone(&builder.owner),
         })
     }
 
     /// Makes what a view asks for and was not asked for before.
-    pub(crate) fn prepare(&mut self, builder: &Builder<'_>, show: Show, window: bool) -> Result<()> {
+    pub(crate) fn prepare(&mut self, builder: &Builder<'_>, view: &View) -> Result<()> {
+        let show = view.settings().show;
+        if view.measuring.wanted && self.error.is_none() {
+            self.error = Some(MeasureError::new(builder)?);
+        }
         if show == Show::Shadow && builder.needs.shadow_rays && self.light_shadow.is_none() {
             self.light_shadow = Some(LightShadow::new(builder)?);
         }
-        self.post.prepare(builder, show, window)
+        self.post.prepare(builder, show, view.is_for_window())
     }
 }

@@ -352,6 +352,15 @@ impl Renderer {
         Ok(())
     }
 
+    /// Takes over the error that a finished frame of this slot has measured, for frames that do not render.
+    ///
+    /// # Errors
+    /// When the view was removed.
+    pub fn note_error(&mut self, id: ViewId, slot: usize) -> Result<()> {
+        self.view_mut(id)?.note_error(slot);
+        Ok(())
+    }
+
     /// Figures of a view's last frame, with the counters of all frames when `frames` has finished.
     ///
     /// # Errors
@@ -366,8 +375,6 @@ impl Renderer {
         id: ViewId,
         frame_slot: usize,
     ) -> Result<()> {
-        let view = self.view(id)?;
-        let (show, window) = (view.settings().show, view.is_for_window());
         let (_, needs, sampling) = key;
         let mut specialization = needs.specialization();
         specialization.values.extend(sampling.specialization().values);
@@ -385,7 +392,11 @@ impl Renderer {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => entry.insert(PassSet::new(&builder)?),
         };
-        passes.prepare(&builder, show, window)
+        let view = self
+            .views
+            .get(&id)
+            .ok_or_else(|| RendererError::Unknown { what: "view", id: id.0.to_string() })?;
+        passes.prepare(&builder, view)
     }
 
     /// Bytes that [`Self::read_back`] takes for a while.

@@ -3,14 +3,16 @@
 
 mod bands;
 mod camera;
+mod measuring;
 mod targets;
 
 use std::sync::Arc;
 
-use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse};
+use caustica_gpu::{Buffer, BufferUse, Device, Frames, Image, Location, MemoryUse, Recorder};
 
 pub(crate) use bands::Bands;
 pub(crate) use camera::CameraMatrices;
+pub(crate) use measuring::Measuring;
 pub(crate) use targets::{History, Past, Targets};
 
 use crate::accumulation::Accumulation;
@@ -19,6 +21,7 @@ use crate::error::Result;
 use crate::gpu_types::AccumulatorPixel;
 use crate::measure::Statistics;
 use crate::needs::Needs;
+use crate::renderer::Accumulated;
 use crate::sampling::Sampling;
 use crate::settings::{Pipeline, Show, ToneMap, ViewSettings};
 
@@ -63,6 +66,8 @@ pub struct View {
     pub(crate) bands: Bands,
     /// What the display image was made with.
     pub(crate) displayed: Option<Displayed>,
+    /// What is measured of the picture.
+    pub(crate) measuring: Measuring,
     /// The image goes to a window: the last pass encodes it and draws the outline.
     window: bool,
 }
@@ -75,6 +80,7 @@ pub(crate) struct Displayed {
     show: Show,
     show_light: Option<LightId>,
     selection_revision: u64,
+    reference_revision: u64,
 }
 
 /// The device's counters and their copies for the host, one a frame in flight.
@@ -119,6 +125,7 @@ impl View {
             frame_count: 0,
             bands: Bands::default(),
             displayed: None,
+            measuring: Measuring::default(),
             window,
         })
     }
@@ -167,6 +174,7 @@ impl View {
             show: self.settings.show,
             show_light: self.settings.show_light,
             selection_revision: self.selection_revision,
+            reference_revision: self.measuring.reference_revision,
         }
     }
 
@@ -206,6 +214,16 @@ impl View {
         if self.sampling() != before {
             self.accumulation.invalidate(Invalidation::Everything, "number of samples");
         }
+    }
+
+    /// What the picture is compared with, where it has the same size; `None`: nothing. Keeps the samples.
+    pub fn set_reference(&mut self, reference: Option<Arc<Accumulated>>) {
+        self.measuring.set_reference(reference);
+    }
+
+    /// Asks for the error of the picture with its next sample; it is in [`Statistics::error`] some frames later.
+    pub fn measure(&mut self) {
+        self.measuring.wanted = true;
     }
 
     /// Whether the next frame shows another place or another scene than the last.
@@ -336,6 +354,18 @@ impl View {
     pub(crate) fn set_displayed(&mut self, display: Displayed) {
         self.displayed = Some(display);
         self.last_window = None;
+    }
+
+    /// Takes over what a finished frame of this slot has measured.
+    pub(crate) fn note_error(&mut self, slot: usize) {
+        if let Some(found) = self.measuring.take(slot) {
+            self.statistics.error = Some(found);
+        }
+    }
+
+    /// Brings to the device what the measuring of the next sample needs.
+    pub(crate) fn prepare_measuring(&mut self, recorder: &mut Recorder) -> Result<()> {
+        self.measuring.prepare(&self.device, recorder, self.extent)
     }
 
     /// Makes targets for these needs unless they are there; the history starts anew with them.

@@ -63,6 +63,8 @@ struct Frame {
     uint64_t accumulator;               // AccumulatorTable; 0 in pipelines without one
     uint64_t sample_index;              // of this frame within the whole sample set, from --sample-offset on
     uint64_t selection;                 // UintTable: bit set by instance slot, outlined by post/window.comp; 0: nothing
+    uint64_t reference;                 // ReferenceTable of the size of the picture; 0: none
+    uint64_t error_blocks;              // ErrorBlockTable; 0 unless pass error runs
     uint64_t ggx_albedo;                // float[GGX_ALBEDO_SIDE squared]; 0: light is reflected once by rough surfaces (glTF to the letter)
     uint seed;
     uint flags;

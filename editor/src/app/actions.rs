@@ -117,6 +117,8 @@ pub enum Action {
     Show(Show),
     /// Ask for an environment image.
     Environment,
+    /// Ask for a picture to compare with.
+    OpenReference,
     /// Surround the scene with this image.
     EnvironmentPath(PathBuf),
     /// Lower the resolution while something moves, or not.
@@ -285,6 +287,7 @@ fn render() -> Vec<Command> {
     let render = |icon, name: &str, action| command(Menu::Render, icon, name, action, None);
     let mut commands = vec![
         render(icon::GLOBE_HEMISPHERE_WEST, "Environment image\u{2026}", Action::Environment),
+        render(icon::TARGET, "Compare with an image\u{2026}", Action::OpenReference),
         render(icon::GAUGE, "Lower resolution while moving", Action::ToggleAdaptive),
     ];
     commands.extend(

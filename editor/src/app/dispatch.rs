@@ -64,6 +64,7 @@ impl Editor {
             Action::CameraFromView => self.camera_from_view(),
             Action::ToggleProjection => self.toggle_projection(),
             Action::Environment => self.ask(Wish::Environment),
+            Action::OpenReference => self.ask(Wish::Reference),
             Action::PlayPause
             | Action::ToStart
             | Action::StepBack

@@ -145,6 +145,7 @@ impl Editor {
             self.state.toasts.error(fault);
         }
         self.play(Instant::now());
+        self.state.error.look(&mut self.session);
         self.keep_audited();
         self.take_keys(&context);
         self.take_dropped_files(&context);
@@ -415,6 +416,7 @@ impl TabViewer for Tabs<'_> {
             Tab::Outliner => panels::outliner::ui(&mut self.cx, ui),
             Tab::Inspector => panels::inspector::ui(&mut self.cx, ui),
             Tab::Render => panels::render::ui(&mut self.cx, ui),
+            Tab::Error => panels::error::ui(&mut self.cx, ui),
             Tab::Passes => panels::reports::passes(&mut self.cx, ui),
             Tab::Acceleration => panels::acceleration::ui(&mut self.cx, ui),
             Tab::Animation => panels::timeline::ui(&mut self.cx, ui),

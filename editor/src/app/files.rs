@@ -1,6 +1,7 @@
 //! Opening, importing and saving. Enters: file names. Leaves: a changed session; reading happens on a worker.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use caustica_scene::PrefabId;
 
@@ -75,9 +76,18 @@ impl Editor {
         match wish {
             Wish::Open => self.load(Purpose::Open, path),
             Wish::Import | Wish::Environment => self.load(Purpose::Import, path),
+            Wish::Reference => self.open_reference(&path),
             Wish::Source(prefab) => self.load(Purpose::Source(prefab), path),
             Wish::SaveAs => self.save_to(&path),
             Wish::Export => self.export_to(path),
+        }
+    }
+
+    /// Compares the picture with one of a file.
+    fn open_reference(&mut self, path: &Path) {
+        match crate::reference::read_exr(path, self.session.picture_extent()) {
+            Ok(picture) => self.state.error.set_reference(&mut self.session, Some(Arc::new(picture))),
+            Err(error) => self.state.toasts.error(format!("{error:#}.")),
         }
     }
 

@@ -141,6 +141,7 @@ impl Session {
     pub fn begin_ui_frame(&mut self) -> anyhow::Result<Recorder> {
         let recorder = self.frames.begin()?;
         self.renderer.note_times(self.view, &self.frames)?;
+        self.renderer.note_error(self.view, recorder.slot())?;
         Ok(recorder)
     }
 
@@ -173,9 +174,9 @@ impl Session {
         self.renderer.view(self.view).map_or(0, |view| view.samples())
     }
 
-    /// Whether more frames would hardly change the image.
+    /// Whether more frames would hardly change the image, or it is as good as was asked for.
     pub fn is_converged(&self) -> bool {
-        self.samples() >= CONVERGED_SAMPLES
+        self.samples() >= CONVERGED_SAMPLES || self.is_good_enough()
     }
 
     /// Whether nothing is left to do: no sample, no structure that is still built or made better, no texture that waits.

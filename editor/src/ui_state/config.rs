@@ -25,6 +25,8 @@ pub enum Tab {
     Render,
     /// Time, and the clips that are played.
     Animation,
+    /// Noise and bias over run time.
+    Error,
     /// Milliseconds of each pass.
     Passes,
     /// What is built, refitted and left alone.
@@ -41,12 +43,13 @@ pub enum Tab {
 
 impl Tab {
     /// Every panel, in the order of the menu.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::View,
         Self::Outliner,
         Self::Inspector,
         Self::Render,
         Self::Animation,
+        Self::Error,
         Self::Passes,
         Self::Acceleration,
         Self::LeftOut,
@@ -63,6 +66,7 @@ impl Tab {
             Self::Inspector => "Inspector",
             Self::Render => "Render",
             Self::Animation => "Animation",
+            Self::Error => "Error",
             Self::Passes => "Passes",
             Self::Acceleration => "Acceleration",
             Self::LeftOut => "Left out",
@@ -81,6 +85,7 @@ pub fn default_layout() -> DockState<Tab> {
     let [rest, _left] = tree.split_left(rest, 0.22, vec![Tab::Outliner]);
     let below = vec![
         Tab::Animation,
+        Tab::Error,
         Tab::Passes,
         Tab::Acceleration,
         Tab::LeftOut,

@@ -146,6 +146,9 @@ pub const SHOW_WIREFRAME: u32 = 18;
 /// Debug view of `show_surface`: barycentric coordinates.
 pub const SHOW_BARYCENTRIC: u32 = 19;
 
+/// Side of the blocks whose sums are in [`super::ErrorBlock`], pixels.
+pub const ERROR_BLOCK_SIDE: u32 = 8;
+
 /// Bit of [`super::Push::argument0`] of pass `light_shadow`, beside the number of the light: what its image holds is
 /// forgotten.
 pub const LIGHT_SHADOW_FRESH: u32 = 0x8000_0000;

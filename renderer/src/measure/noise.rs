@@ -53,7 +53,12 @@ impl Noise {
             terms.sum::<f64>() / 3.0
         });
         let (sum, squares) = pixels.fold((0.0, 0.0), |(sum, squares), one| (sum + one, squares + one * one));
-        let rel_mse = sum / image.mean.len() as f64;
+        Self::of_sums(sum, squares, image.mean.len() as f64)
+    }
+
+    /// Of the sum of the pixels' terms of relMSE, and that of their squares.
+    pub(super) fn of_sums(sum: f64, squares: f64, pixels: f64) -> Option<Self> {
+        let rel_mse = sum / pixels;
         if !rel_mse.is_finite() {
             return None;
         }

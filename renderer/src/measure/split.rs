@@ -71,14 +71,18 @@ impl Split {
                 *block += b;
             }
         }
-        let count = picture.mean.len() as f64;
+        Ok(Self::of_sums(total, noise, &blocks, picture.mean.len() as f64))
+    }
+
+    /// Of the sums of the pixels' terms, those of the bias by blocks.
+    pub(super) fn of_sums(total: f64, noise: f64, blocks: &[f64], count: f64) -> Self {
         let bias = blocks.iter().sum::<f64>() / count;
         let mean = bias * count / blocks.len() as f64;
         let squares = blocks.iter().map(|block| (block - mean).powi(2)).sum::<f64>();
         let width = STANDARD_ERRORS * squares.sqrt() / count;
         let root = |rel_mse: f64| rel_mse.max(0.0).sqrt();
         let bias = Estimate { value: root(bias), low: root(bias - width), high: root(bias + width) };
-        Ok(Self { total: root(total / count), noise: root(noise / count), bias })
+        Self { total: root(total / count), noise: root(noise / count), bias }
     }
 }
 

@@ -110,4 +110,6 @@ pub struct Statistics {
     pub shadow_rays: u64,
     /// Bytes uploaded in the last frame, constants included.
     pub uploaded_bytes: u64,
+    /// The newest error that was measured, where that was asked for.
+    pub error: Option<super::LiveError>,
 }

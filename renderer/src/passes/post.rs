@@ -19,12 +19,14 @@ pub(crate) struct Post {
     surface: Option<Live<ComputePipeline>>,
     /// Made when dropped samples are shown for the first time.
     non_finite: Option<Live<ComputePipeline>>,
+    /// Made when noise or error is shown for the first time.
+    error_map: Option<Live<ComputePipeline>>,
     /// Made for the first view with a window.
     window: Option<Live<ComputePipeline>>,
 }
 
 /// What a frame shows.
-pub(crate) struct Shown {
+pub(crate) struct Shown<'a> {
     pub(crate) show: Show,
     /// The shadow of a light was traced.
     pub(crate) light_shadow: bool,
@@ -34,6 +36,8 @@ pub(crate) struct Shown {
     pub(crate) history: usize,
     /// This frame's sample is in the accumulator.
     pub(crate) added: bool,
+    /// What the picture is compared with.
+    pub(crate) reference: Option<&'a Buffer>,
 }
 
 /// How a view is made visible.
@@ -48,12 +52,14 @@ enum Way<'a> {
     Surface(u32),
     /// `non_finite.comp`.
     NonFinite,
+    /// `error_map.comp`; against a reference, or not.
+    ErrorMap(bool),
 }
 
 impl Post {
     pub(crate) fn new(builder: &Builder<'_>) -> Result<Self> {
         let image = builder.compute("post", "passes/post/post.comp")?;
-        Ok(Self { image, target: None, surface: None, non_finite: None, window: None })
+        Ok(Self { image, target: None, surface: None, non_finite: None, error_map: None, window: None })
     }
 
     /// Makes what a view asks for and was not asked for before.
@@ -64,6 +70,9 @@ impl Post {
                 (Some(&mut self.surface), "post.show_surface", "passes/post/show_surface.comp")
             }
             Show::NonFinite => (Some(&mut self.non_finite), "post.non_finite", "passes/post/non_finite.comp"),
+            Show::Noise | Show::Error => {
+                (Some(&mut self.error_map), "post.error_map", "passes/post/error_map.comp")
+            }
             _ => (Some(&mut self.target), "post.show", "passes/post/show.comp"),
         };
         if let Some(pipeline @ None) = pipeline {
@@ -82,7 +91,7 @@ impl Post {
         scope: &Scope<'_>,
         targets: &Targets,
         accumulator: &Buffer,
-        shown: &Shown,
+        shown: &Shown<'_>,
     ) -> Result<()> {
         let unused = scope.tables.textures.white();
         let read_sums = [Use::Buffer(accumulator, Stage::Compute, Access::StorageRead)];
@@ -103,6 +112,18 @@ impl Post {
                 let binds = [("gbuffer_id", Bind::Image(&targets.id)), display];
                 if let Some(pipeline) = &self.surface {
                     scope.compute(recorder, "post.show_surface", pipeline, &binds, &[], kind)?;
+                }
+            }
+            Way::ErrorMap(against_reference) => {
+                if let Some(pipeline) = &self.error_map {
+                    let mut uses = read_sums.to_vec();
+                    uses.extend(
+                        shown
+                            .reference
+                            .map(|buffer| Use::Buffer(buffer, Stage::Compute, Access::StorageRead)),
+                    );
+                    let kind = u32::from(against_reference);
+                    scope.compute(recorder, "post.error_map", pipeline, &[display], &uses, kind)?;
                 }
             }
             Way::NonFinite => {
@@ -150,7 +171,7 @@ fn show_target(
     scope.compute(recorder, "post.show", pipeline, &binds, &[], kind)
 }
 
-fn way<'a>(shown: &Shown, targets: &'a Targets) -> Way<'a> {
+fn way<'a>(shown: &Shown<'_>, targets: &'a Targets) -> Way<'a> {
     let normal = &targets.normal[shown.parity % targets.normal.len()];
     let depth = &targets.depth[shown.parity % targets.depth.len()];
     let history = targets.history.as_ref().map(|history| &history.diffuse[shown.history]);
@@ -181,5 +202,7 @@ fn way<'a>(shown: &Shown, targets: &'a Targets) -> Way<'a> {
         Show::RayDepth => Way::Integer(constants::SHOW_RAY_DEPTH, &targets.ray_depth),
         Show::History => Way::Float(constants::SHOW_HISTORY, history),
         Show::NonFinite => Way::NonFinite,
+        Show::Noise => Way::ErrorMap(false),
+        Show::Error => Way::ErrorMap(true),
     }
 }

@@ -53,11 +53,15 @@ pub enum Show {
     History,
     /// Where samples were dropped, and by which pass.
     NonFinite,
+    /// Noise of each pixel.
+    Noise,
+    /// Difference of each pixel from the reference.
+    Error,
 }
 
 impl Show {
     /// Everything that can be shown, in the order of menus, with its name.
-    pub const ALL: [(Self, &'static str); 23] = [
+    pub const ALL: [(Self, &'static str); 25] = [
         (Self::Image, "Image"),
         (Self::BaseColor, "Base colour"),
         (Self::Normal, "Shading normal"),
@@ -81,6 +85,8 @@ impl Show {
         (Self::RayDepth, "Ray depth"),
         (Self::History, "History length"),
         (Self::NonFinite, "Not finite"),
+        (Self::Noise, "Noise"),
+        (Self::Error, "Error"),
     ];
 
     /// What its colours mean, in words for a user.
@@ -130,6 +136,12 @@ impl Show {
             }
             Self::NonFinite => {
                 "Samples dropped because they are no number. Yellow: by the surface itself; orange: by direct light; magenta: by shading; red: in an earlier sample. Grey: the picture"
+            }
+            Self::Noise => {
+                "What the samples of each pixel differ by: from 0.1 % of its brightness, blue, by 1 %, green, and 10 %, yellow, to 100 %, red"
+            }
+            Self::Error => {
+                "Difference from the reference: from 0.1 % of its brightness, blue, by 1 %, green, and 10 %, yellow, to 100 %, red; black without a reference of this size"
             }
         }
     }

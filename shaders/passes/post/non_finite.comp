@@ -24,6 +24,11 @@ const vec3 BEFORE = vec3(0.8, 0.0, 0.0);
 // A target that was left out is stood in for by one texel. A macro: drivers lose bindings that are handed to functions.
 #define IS_SPOILT(target) (textureSize(target, 0) == ivec2(frame.extent_px) && !is_finite(texelFetch(target, at, 0)))
 
+float samples_kept(Frame frame, uvec2 pixel) {
+    Streams streams = streams_of(frame, pixel);
+    return streams.a.w + streams.b.w;
+}
+
 void main() {
     Frame frame = FrameTable(push.frame_address).frame;
     uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -38,7 +43,7 @@ void main() {
         color = IN_DIRECT_LIGHT;
     } else if (IS_SPOILT(shaded)) {
         color = IN_SHADING;
-    } else if (!shows_sample(frame) && accumulated_sum(frame, pixel).w < float(frame.accumulated + push.argument0)) {
+    } else if (!shows_sample(frame) && samples_kept(frame, pixel) < float(frame.accumulated + push.argument0)) {
         color = BEFORE;
     }
     imageStore(display, at, vec4(color, 1.0));

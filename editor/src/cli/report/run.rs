@@ -6,6 +6,7 @@ use caustica_renderer::{
     Accumulated, ErrorMetrics, Halves, Radiance, Split, ViewSettings, flip_hdr, flip_ldr,
 };
 use indicatif::ProgressBar;
+use rayon::prelude::*;
 
 use crate::curve::{Curve, Point};
 use crate::reference::settings_of_truth;
@@ -78,17 +79,24 @@ pub(super) fn measure(
         }
     };
     let exposure = settings.exposure_ev.exp2();
-    let mut points = Vec::new();
-    for (number, stop) in stops.iter().enumerate() {
+    let compare = |(number, stop): (usize, &Stop)| -> anyhow::Result<Point> {
         let pair = others.get(number).map(|other| pair(&stop.picture, &other.picture));
         let split = Split::of(reference, pair.as_ref().unwrap_or(&stop.picture), halves)?;
-        points.push(point(reference, stop, split, exposure)?);
-    }
+        point(reference, stop, split, exposure, number + 1 == stops.len())
+    };
+    // FLIP takes longer than many a picture.
+    let points = stops.par_iter().enumerate().map(compare).collect::<anyhow::Result<_>>()?;
     let picture = stops.pop().map_or_else(|| reference.clone(), |stop| stop.picture);
     Ok(Measured { curve: Curve(points), picture })
 }
 
-fn point(reference: &Accumulated, stop: &Stop, split: Split, exposure: f32) -> anyhow::Result<Point> {
+fn point(
+    reference: &Accumulated,
+    stop: &Stop,
+    split: Split,
+    exposure: f32,
+    is_last: bool,
+) -> anyhow::Result<Point> {
     let [truth, seen] = [reference, &stop.picture].map(|image| Radiance::new(image.extent, &image.mean));
     let (truth, seen) = (truth?, seen?);
     Ok(Point {
@@ -97,7 +105,7 @@ fn point(reference: &Accumulated, stop: &Stop, split: Split, exposure: f32) -> a
         wall_s: stop.wall_s,
         metrics: ErrorMetrics::of(&truth, &seen)?,
         flip: flip_ldr(&truth, &seen, exposure)?.mean,
-        flip_hdr: flip_hdr(&truth, &seen)?.map(|flip| flip.mean),
+        flip_hdr: if is_last { flip_hdr(&truth, &seen)?.map(|flip| flip.mean) } else { None },
         split,
     })
 }

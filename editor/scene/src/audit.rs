@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 
 use glam::DAffine3;
 
+use crate::alike;
 use crate::animation::ClipChoice;
 use crate::assets::{AlphaMode, Environment, Material, Mesh, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId, Target, TextureId};
-use crate::import::counted;
 use crate::import::geometry::has_no_area;
+use crate::import::{counted, short};
 use crate::node::NodeKind;
 use crate::prefab::{PartOverride, PartPath, Prefab};
 use crate::transform::is_degenerate;
@@ -24,7 +25,8 @@ const LARGE_SCALE_RATIO: f64 = 1e4;
 /// Distance from the origin, in sizes of the object, above which single precision alone would show steps.
 const FAR_IN_SIZES: f64 = 1e6;
 
-/// Looks through a document; the worst findings come first, then in order of subject.
+/// Looks through a document; the worst findings come first, then in order of subject. Of one kind the first are listed, the
+/// others counted.
 pub fn audit(document: &Document) -> Vec<Finding> {
     let mut audit = Audit { document, findings: Vec::new() };
     audit.prefabs();
@@ -41,7 +43,13 @@ pub fn audit(document: &Document) -> Vec<Finding> {
     audit.scene();
     let mut findings = audit.findings;
     findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.subject));
-    findings
+    let kind = |finding: &Finding| {
+        (finding.severity, finding.subject.kind_and_id().0, alike::kind_of(&finding.message))
+    };
+    alike::summed(findings, kind, |listed, last, count| Finding {
+        message: format!("and {count} more like it, the last {}", short(&last.name)),
+        ..listed.clone()
+    })
 }
 
 struct Audit<'a> {

@@ -23,7 +23,7 @@ mod watched;
 
 pub use environment::load_environment;
 pub use error::{ImportError, Warning, counted};
-pub(crate) use error::{UTF16, is_utf16, plain, short};
+pub(crate) use error::{UTF16, is_utf16, plain, short, summed};
 pub use shapes::load_shapes;
 pub(crate) use uri::{Location, is_address, leads_out, resolve};
 
@@ -78,7 +78,7 @@ pub fn load_with_progress(
 ) -> Result<Imported, ImportError> {
     progress("opening", 0.0);
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    let imported = match extension.as_deref() {
+    let mut imported = match extension.as_deref() {
         Some("gltf" | "glb") => gltf::load(path, options, progress),
         Some("obj") => obj::load(path, options, progress),
         _ => Err(ImportError::new(
@@ -86,6 +86,7 @@ pub fn load_with_progress(
             "the name does not end in .gltf, .glb or .obj, which are the formats that are read",
         )),
     }?;
+    imported.warnings = summed(imported.warnings);
     tracing::debug!(
         file = %path.display(),
         nodes = imported.prefab.nodes().len(),

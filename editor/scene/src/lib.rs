@@ -2,10 +2,12 @@
 //! In: files and edits. Out: a [`Document`] with double-precision transforms and a [`ChangeSet`] of what changed.
 //! It knows no window and no device, and it does not know the renderer.
 
+mod alike;
 mod animation;
 mod assets;
 mod audit;
 mod changes;
+mod deep;
 mod document;
 mod edit;
 mod export;

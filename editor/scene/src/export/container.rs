@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::json::{Object, Put};
 use super::{ExportError, ExportFormat};
+use crate::deep;
 use crate::import::{Location, resolve};
 use crate::project::atomic;
 
@@ -36,7 +37,7 @@ pub(super) fn refuse_foreign_bin<'a>(
 /// The text of a `.gltf`, where it is one.
 fn json_of(path: &Path) -> Option<Value> {
     path.extension().filter(|ending| ending.eq_ignore_ascii_case("gltf"))?;
-    serde_json::from_slice(&std::fs::read(path).ok().filter(|bytes| !bytes.is_empty())?).ok()
+    deep::parse(&std::fs::read(path).ok().filter(|bytes| !bytes.is_empty())?).ok()
 }
 
 fn uris_of(json: &Value) -> Vec<&str> {
@@ -87,6 +88,7 @@ pub(super) fn write(
         }
         ExportFormat::Gltf => {
             let text = serde_json::to_string_pretty(&json)
+                .map(deep::written)
                 .map_err(|error| ExportError::new(path, error.to_string()))?;
             // First the bytes: a reader that finds the new JSON finds them too.
             if separate {
@@ -111,7 +113,8 @@ fn uri_of(path: &Path) -> String {
 }
 
 fn binary(json: &Value, bytes: &[u8]) -> Result<Vec<u8>, String> {
-    let mut text = serde_json::to_vec(json).map_err(|error| error.to_string())?;
+    let text = serde_json::to_string(json).map_err(|error| error.to_string())?;
+    let mut text = deep::written(text).into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let chunks: &[(&[u8; 4], &[u8])] = match bytes.is_empty() {
         true => &[(b"JSON", &text)],

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::alike::{self, kind_of};
+
 /// Characters that turn the direction of what follows, so that a name reads as another.
 fn turns_text(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -101,6 +103,20 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         told(f, &self.file, &self.place, &self.message)
     }
+}
+
+/// The first warnings of each kind, and how many more there are.
+pub(crate) fn summed(warnings: Vec<Warning>) -> Vec<Warning> {
+    let kind = |warning: &Warning| {
+        // A JSON pointer; else a line, or a kind of thing and its name.
+        let place = warning.place.split(' ').next().unwrap_or_default();
+        (warning.file.clone(), kind_of(place), kind_of(&warning.message))
+    };
+    let more = |listed: &Warning, last: &Warning, count: usize| {
+        let message = format!("and {count} more like it, the last at {}", short(&last.place));
+        Warning { message, ..listed.clone() }
+    };
+    alike::summed(warnings, kind, more)
 }
 
 fn told(f: &mut fmt::Formatter<'_>, file: &Path, place: &str, what: &str) -> fmt::Result {

@@ -138,7 +138,7 @@ impl<'a> Loader<'a> {
     pub fn finish(mut self, reason: &str, file: Fingerprint) -> Project {
         self.document.mark_all_added(reason);
         let Self { document, meta, warnings, outside, .. } = self;
-        Project { document, meta, warnings, outside, file }
+        Project { document, meta, warnings: import::summed(warnings), outside, file }
     }
 }
 

@@ -25,6 +25,7 @@ mod hierarchy;
 mod import;
 mod journal;
 mod kept;
+mod limits;
 mod lobes;
 mod locks;
 mod obj;

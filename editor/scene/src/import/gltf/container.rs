@@ -6,6 +6,7 @@ use std::ops::Range;
 use serde_json::Value;
 
 use super::json::Fault;
+use crate::deep;
 
 const MAGIC: &[u8] = b"glTF";
 const CHUNK_JSON: u32 = 0x4E4F_534A;
@@ -81,7 +82,7 @@ fn parse(bytes: &[u8]) -> Result<Value, Fault> {
         let reason = "the JSON begins with a byte order mark, which glTF forbids; save it without one";
         return Err(Fault::new("line 1 column 1", reason));
     }
-    let json: Value = serde_json::from_slice(bytes).map_err(|error| {
+    let json: Value = deep::parse(bytes).map_err(|error| {
         let place = format!("line {} column {}", error.line(), error.column());
         let reason = error.to_string().replace(&format!(" at {place}"), "");
         Fault::new(place, format!("not valid JSON: {reason}"))

@@ -1,0 +1,55 @@
+//! What is there in great numbers: warnings of one kind, depth of `extras`.
+
+use std::path::{Path, PathBuf};
+
+use caustica_scene::import::{ImportOptions, load};
+use caustica_scene::{Document, Local, export};
+use serde_json::{Value, json};
+
+/// A file of one triangle that so many nodes place, with these members too.
+fn write(folder: &Path, nodes: usize, members: Value) -> PathBuf {
+    let buffer = "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+    let list: Vec<Value> = (0..nodes).map(|i| json!({"name": i.to_string(), "mesh": 0})).collect();
+    let mut file = json!({"asset": {"version": "2.0"}, "nodes": list,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": buffer}]});
+    file.as_object_mut().unwrap().extend(members.as_object().unwrap().clone());
+    let path = folder.join("many.gltf");
+    std::fs::write(&path, file.to_string()).unwrap();
+    path
+}
+
+#[test]
+fn warnings_of_one_kind_are_summed_up_after_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let each = |make: fn(usize) -> Value| (0..50).map(make).collect::<Vec<_>>();
+    let members = json!({"images": each(|i| json!({"uri": format!("none{i}.png")})), "textures": each(|i| json!({"source": i})),
+        "materials": each(|i| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}}))});
+    let imported = load(&write(folder.path(), 1, members), &ImportOptions::default()).unwrap();
+    let said: Vec<String> = imported.warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(said.len(), 11, "{said:?}");
+    assert!(said[9].contains("/images/9: the image cannot be read"), "{}", said[9]);
+    assert!(said[10].ends_with("/images/9: and 40 more like it, the last at /images/49"), "{}", said[10]);
+}
+
+#[test]
+fn extras_of_any_depth_are_read_and_exported_as_they_were() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), 1, json!({"extras": {"a": "HERE"}, "extensions": {"X_none": ["HERE"]}}));
+    let deep = format!("{}{{\"b\":\"]\\\"\"}}{}", "[".repeat(5000), "]".repeat(5000));
+    let text = std::fs::read_to_string(&path).unwrap().replace("\"HERE\"", &deep);
+    std::fs::write(&path, text).unwrap();
+    let mut document = Document::new();
+    let prefab = document.add_imported(load(&path, &ImportOptions::default()).unwrap()).unwrap();
+    let (_, edit) = document.instantiate_edit(prefab, None, Local::default());
+    document.apply(edit).unwrap();
+    for name in ["out.gltf", "out.glb"] {
+        let out = folder.path().join(name);
+        export(&document, &out).unwrap();
+        let bytes = std::fs::read(&out).unwrap();
+        let text: String = String::from_utf8_lossy(&bytes).chars().filter(|c| !c.is_whitespace()).collect();
+        assert_eq!(text.matches(&deep).count(), 2, "{name}");
+        load(&out, &ImportOptions::default()).unwrap();
+    }
+}

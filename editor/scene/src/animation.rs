@@ -1,6 +1,8 @@
 //! Clips of an imported file: key frames of its parts, and their values at a time (glTF 2.0, section 3.11 and
 //! appendix C). In: times and values as the file has them. Out: values in double precision. Knows no document.
 
+use std::sync::Arc;
+
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -112,7 +114,7 @@ pub enum Interpolation {
     CubicSpline,
 }
 
-/// Key frames of one thing that moves.
+/// Key frames of one thing that moves. Channels whose keys are the same list of a file share it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
     /// Which part of the prefab; of no account where a material changes.
@@ -122,10 +124,10 @@ pub struct Channel {
     /// What is between the keys.
     pub interpolation: Interpolation,
     /// Times of the keys, seconds, growing.
-    pub times_s: Vec<f32>,
+    pub times_s: Arc<[f32]>,
     /// [`Self::width`] numbers a key, key after key; with [`Interpolation::CubicSpline`] three times as many:
     /// in-tangent, value, out-tangent.
-    pub values: Vec<f32>,
+    pub values: Arc<[f32]>,
 }
 
 /// The value of a channel at a time.

@@ -16,6 +16,7 @@ mod image;
 mod image_guard;
 mod meshopt;
 mod obj;
+mod room;
 mod shapes;
 pub(crate) mod tangents;
 mod uri;

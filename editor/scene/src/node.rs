@@ -12,6 +12,9 @@ use crate::prefab::{PartOverride, PartPath};
 use crate::project::NodeRecord;
 use crate::transform::Local;
 
+/// Most nodes that a file or a document may have; each part of each instance counts.
+pub(crate) const MAX_NODES: usize = 4_000_000;
+
 /// One node of the document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {

@@ -224,8 +224,8 @@ fn materials_are_sent_in_their_pose() {
             part: 0,
             path: ChannelPath::Material(MaterialId(0), roughness),
             interpolation: Interpolation::Linear,
-            times_s: vec![0.0, 1.0],
-            values: vec![1.0, 0.0],
+            times_s: [0.0, 1.0].into(),
+            values: [1.0, 0.0].into(),
         }],
     ))];
     let mut rig = Rig::of(file);

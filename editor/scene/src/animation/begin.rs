@@ -16,12 +16,12 @@ impl Channel {
             _ => self.key_at_zero(),
         };
         let per_key = self.width() * self.sets();
-        self.times_s.drain(..before);
-        self.values.drain(..(before * per_key).min(self.values.len()));
-        if let Some(key) = key {
-            self.times_s.insert(0, 0.0);
-            self.values.splice(0..0, key);
-        }
+        let times_s = self.times_s.get(before..).unwrap_or(&[]);
+        let values = self.values.get(before * per_key..).unwrap_or(&[]);
+        let added = key.is_some().then_some(0.0);
+        let values = key.into_iter().flatten().chain(values.iter().copied()).collect();
+        self.times_s = added.into_iter().chain(times_s.iter().copied()).collect();
+        self.values = values;
     }
 
     /// The numbers of a key at 0: a cubic over a part of its span is the cubic of the slope at the cut.

@@ -4,7 +4,7 @@
 use super::*;
 
 fn channel(path: ChannelPath, interpolation: Interpolation, times_s: &[f32], values: &[f32]) -> Channel {
-    Channel { part: 0, path, interpolation, times_s: times_s.to_vec(), values: values.to_vec() }
+    Channel { part: 0, path, interpolation, times_s: times_s.into(), values: values.into() }
 }
 
 fn x_at(channel: &Channel, time_s: f64) -> f64 {

@@ -54,7 +54,7 @@ pub struct Mesh {
     /// One a primitive, primitive space.
     own_bounds: Vec<Option<Bounds>>,
     /// One a primitive; empty for a mesh that nothing bends.
-    reach: Vec<Reach>,
+    reach: Arc<[Reach]>,
 }
 
 /// A range of a mesh's indices, or of its shapes, with one material.
@@ -74,7 +74,7 @@ impl Mesh {
     /// A mesh with its bounds computed; its morph targets have weight 0.
     pub fn new(name: String, data: Arc<MeshData>, primitives: Vec<Primitive>) -> Self {
         let default_weights = vec![0.0; data.morph.len()];
-        let (own_bounds, reach) = (Vec::new(), Vec::new());
+        let (own_bounds, reach) = (Vec::new(), Arc::default());
         let shapes = None;
         let mut mesh =
             Self { name, data, shapes, primitives, bounds: None, default_weights, own_bounds, reach };

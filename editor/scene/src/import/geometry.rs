@@ -3,10 +3,12 @@
 //! tangent everywhere and no degenerate triangle, and counts of what was repaired. Knows no file format.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
+use super::room::{NoRoom, Room};
 use super::tangents;
 use crate::assets::{Mesh, MeshData, Primitive};
 use crate::ids::MaterialId;
@@ -17,6 +19,11 @@ pub(super) use deform::{Deltas, Hold};
 
 /// Sine squared between two edges below which a triangle has no area.
 const NO_AREA_SIN2: f64 = 1e-26;
+
+/// Bytes of a vertex in the lists that every mesh has.
+const VERTEX_BYTES: usize = 2 * size_of::<Vec3>() + size_of::<Vec4>() + size_of::<Vec2>();
+/// Bytes that a mesh keeps for each joint that holds something of a primitive.
+const HELD_BYTES: usize = 96;
 
 /// Attributes of one primitive as they were read; all of one length.
 #[derive(Clone, Debug, Default)]
@@ -54,21 +61,49 @@ pub(super) struct PrimitiveInput<'a> {
 
 /// Vertices and indices that grow by a primitive at a time.
 #[derive(Default)]
-pub(super) struct MeshBuilder {
+pub(super) struct MeshBuilder<'a> {
+    /// What the mesh may take in memory; `None`: it is bounded elsewhere.
+    room: Option<&'a Room>,
     data: MeshData,
     has_tex_coords1: bool,
     has_colors: bool,
+    /// How many joints the vertices name at most.
+    joints: usize,
     primitives: Vec<Primitive>,
     /// Where attributes that several primitives share were put.
     shared: HashMap<usize, (u32, Arc<Attributes>)>,
     pub repairs: Repairs,
 }
 
-/// The mesh would have more vertices or indices than 32 bits can count.
+/// Why a mesh is not built.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct TooLarge;
+pub(super) enum TooLarge {
+    /// It would have more vertices or indices than 32 bits can count.
+    Counts,
+    Bytes(NoRoom),
+}
 
-impl MeshBuilder {
+impl fmt::Display for TooLarge {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Counts => f.write_str("the mesh has more vertices than 32 bits can count"),
+            Self::Bytes(no_room) => no_room.fmt(f),
+        }
+    }
+}
+
+impl From<NoRoom> for TooLarge {
+    fn from(no_room: NoRoom) -> Self {
+        Self::Bytes(no_room)
+    }
+}
+
+impl<'a> MeshBuilder<'a> {
+    /// A mesh that may take this much memory.
+    pub fn within(room: &'a Room) -> Self {
+        Self { room: Some(room), ..Self::default() }
+    }
+
     /// Adds a primitive; one without a triangle left adds nothing and returns false.
     pub fn add(&mut self, input: PrimitiveInput<'_>) -> Result<bool, TooLarge> {
         let PrimitiveInput { attributes, indices, material, normal_map_tex_coord } = input;
@@ -86,7 +121,7 @@ impl MeshBuilder {
             let base = self.add_shared(attributes)?;
             indices.into_iter().map(|i| i + base).collect()
         } else {
-            let split = self.split(attributes, &indices, mikktspace);
+            let split = self.split(attributes, &indices, mikktspace)?;
             let base = self.append(&split.0)?;
             split.1.into_iter().map(|i| i + base).collect()
         };
@@ -102,8 +137,13 @@ impl MeshBuilder {
     }
 
     /// The finished mesh.
-    pub fn finish(mut self, name: String) -> Mesh {
+    pub fn finish(mut self, name: String) -> Result<Mesh, TooLarge> {
         let count = self.data.positions.len();
+        if let Some(room) = self.room {
+            room.take(self.missing(count, self.has_tex_coords1, self.has_colors), 1)?;
+            room.take(deform::missing(&self.data, None, count), 1)?;
+        }
+        self.data.tex_coords0.resize(count, Vec2::ZERO);
         if self.has_tex_coords1 {
             self.data.tex_coords1.resize(count, Vec2::ZERO);
         } else {
@@ -115,7 +155,15 @@ impl MeshBuilder {
             self.data.colors.clear();
         }
         deform::fill_up(&mut self.data);
-        Mesh::new(name, Arc::new(self.data), self.primitives)
+        Ok(Mesh::new(name, Arc::new(self.data), self.primitives))
+    }
+
+    /// Bytes that the second texture coordinates and the colours lack to have `count` entries, of those that are wanted.
+    fn missing(&self, count: usize, tex_coords1: bool, colors: bool) -> usize {
+        let lacks = |length: usize, size: usize| count.saturating_sub(length).saturating_mul(size);
+        let tex_coords1 = if tex_coords1 { lacks(self.data.tex_coords1.len(), size_of::<Vec2>()) } else { 0 };
+        let colors = if colors { lacks(self.data.colors.len(), size_of::<Vec4>()) } else { 0 };
+        tex_coords1.saturating_add(colors)
     }
 
     fn without_bad_triangles(&mut self, positions: &[Vec3], indices: Vec<u32>) -> Vec<u32> {
@@ -152,7 +200,17 @@ impl MeshBuilder {
         attributes: &Attributes,
         indices: &[u32],
         mikktspace: Option<u32>,
-    ) -> (Attributes, Vec<u32>) {
+    ) -> Result<(Attributes, Vec<u32>), TooLarge> {
+        if let Some(room) = self.room {
+            match (&attributes.normals, mikktspace) {
+                (None, _) => {
+                    let morphed = attributes.targets.len().saturating_mul(2 * size_of::<Vec3>());
+                    room.peek(indices.len(), VERTEX_BYTES.saturating_add(morphed))?;
+                }
+                (_, Some(_)) => room.take(indices.len(), size_of::<Vec4>())?,
+                _ => {}
+            }
+        }
         let repaired = match &attributes.normals {
             None => Some(flat_normals(attributes, indices)),
             Some(normals) => {
@@ -161,10 +219,10 @@ impl MeshBuilder {
             }
         };
         let (attributes, indices) = repaired.unwrap_or_else(|| compacted(attributes, indices));
-        match mikktspace {
+        Ok(match mikktspace {
             Some(tex_coord) => with_mikktspace(&attributes, &indices, tex_coord),
             None => (attributes, indices),
-        }
+        })
     }
 
     fn with_repaired_normals(&mut self, attributes: &Attributes, indices: &[u32]) -> Attributes {
@@ -190,11 +248,16 @@ impl MeshBuilder {
 
     /// Appends vertices, clean, and returns the number of the first.
     fn append(&mut self, new: &Attributes) -> Result<u32, TooLarge> {
-        let data = &mut self.data;
-        let base = data.positions.len();
+        let base = self.data.positions.len();
         let count = new.positions.len();
-        let end = base.checked_add(count).ok_or(TooLarge)?;
-        u32::try_from(end).map_err(|_| TooLarge)?;
+        let end = base.checked_add(count).ok_or(TooLarge::Counts)?;
+        u32::try_from(end).map_err(|_| TooLarge::Counts)?;
+        if let Some(room) = self.room {
+            room.take(count, VERTEX_BYTES)?;
+            room.take(self.missing(end, new.tex_coords1.is_some(), new.colors.is_some()), 1)?;
+            room.take(deform::missing(&self.data, Some(new), end), 1)?;
+        }
+        let data = &mut self.data;
         let bad = &mut self.repairs.non_finite_values;
         // Non-finite positions are used by no triangle any more; they only must not reach a device.
         let positions = new.positions.iter().copied();
@@ -213,25 +276,29 @@ impl MeshBuilder {
             }
         }
         data.tangents.resize(end, Vec4::new(1.0, 0.0, 0.0, 1.0));
-        extend_vec2(&mut data.tex_coords0, new.tex_coords0.as_deref(), base, end, bad);
-        extend_vec2(&mut data.tex_coords1, new.tex_coords1.as_deref(), base, end, bad);
-        data.colors.resize(base, Vec4::ONE);
-        for &color in new.colors.iter().flatten() {
-            *bad += usize::from(!color.is_finite());
-            data.colors.push(if color.is_finite() { color } else { Vec4::ONE });
+        extend_vec2(&mut data.tex_coords0, new.tex_coords0.as_deref(), base, bad);
+        extend_vec2(&mut data.tex_coords1, new.tex_coords1.as_deref(), base, bad);
+        if let Some(colors) = &new.colors {
+            data.colors.resize(base, Vec4::ONE);
+            *bad += colors.iter().filter(|color| !color.is_finite()).count();
+            data.colors.extend(colors.iter().map(|color| if color.is_finite() { *color } else { Vec4::ONE }));
         }
-        data.colors.resize(end, Vec4::ONE);
         deform::append_skin(data, new, base);
         deform::append_targets(data, new, base, bad);
         self.has_tex_coords1 |= new.tex_coords1.is_some();
         self.has_colors |= new.colors.is_some();
+        self.joints = self.joints.max(deform::joint_count(new));
         Ok(base as u32)
     }
 
     fn push_primitive(&mut self, indices: Vec<u32>, material: MaterialId) -> Result<(), TooLarge> {
-        let first = u32::try_from(self.data.indices.len()).map_err(|_| TooLarge)?;
-        let count = u32::try_from(indices.len()).map_err(|_| TooLarge)?;
-        first.checked_add(count).ok_or(TooLarge)?;
+        let first = u32::try_from(self.data.indices.len()).map_err(|_| TooLarge::Counts)?;
+        let count = u32::try_from(indices.len()).map_err(|_| TooLarge::Counts)?;
+        first.checked_add(count).ok_or(TooLarge::Counts)?;
+        if let Some(room) = self.room {
+            room.take(indices.len(), size_of::<u32>())?;
+            room.take(self.joints.min(indices.len()), HELD_BYTES)?;
+        }
         self.data.indices.extend(indices);
         self.primitives.push(Primitive {
             first_index: first,
@@ -271,13 +338,14 @@ pub(crate) fn has_no_area(p: Vec3, q: Vec3, r: Vec3) -> bool {
     (a * scale).cross(b * scale).length_squared() <= NO_AREA_SIN2
 }
 
-fn extend_vec2(to: &mut Vec<Vec2>, from: Option<&[Vec2]>, base: usize, end: usize, bad: &mut usize) {
+/// A list stays as short as nobody has any; then it begins with zeros.
+fn extend_vec2(to: &mut Vec<Vec2>, from: Option<&[Vec2]>, base: usize, bad: &mut usize) {
+    let Some(from) = from else {
+        return;
+    };
     to.resize(base, Vec2::ZERO);
-    for &value in from.unwrap_or(&[]) {
-        *bad += usize::from(!value.is_finite());
-        to.push(if value.is_finite() { value } else { Vec2::ZERO });
-    }
-    to.resize(end, Vec2::ZERO);
+    *bad += from.iter().filter(|value| !value.is_finite()).count();
+    to.extend(from.iter().map(|value| if value.is_finite() { *value } else { Vec2::ZERO }));
 }
 
 /// The attributes of the vertices `order`, one after the other.
@@ -381,66 +449,4 @@ fn with_mikktspace(attributes: &Attributes, indices: &[u32], tex_coord: u32) -> 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn triangle(p: Vec3, q: Vec3, r: Vec3) -> Arc<Attributes> {
-        Arc::new(Attributes { positions: vec![p, q, r], ..Attributes::default() })
-    }
-
-    fn build(attributes: &Arc<Attributes>, indices: Vec<u32>) -> (Mesh, Repairs) {
-        let mut builder = MeshBuilder::default();
-        let input =
-            PrimitiveInput { attributes, indices, material: MaterialId(0), normal_map_tex_coord: None };
-        assert!(builder.add(input).is_ok());
-        let repairs = builder.repairs;
-        (builder.finish(String::new()), repairs)
-    }
-
-    #[test]
-    fn missing_normals_are_flat() {
-        let (mesh, _) = build(&triangle(Vec3::ZERO, Vec3::X, Vec3::Y), vec![0, 1, 2]);
-        assert_eq!(mesh.data.normals, vec![Vec3::Z; 3]);
-        let tangent = mesh.data.tangents[0];
-        assert!(tangent.truncate().dot(Vec3::Z).abs() < 1e-6);
-    }
-
-    #[test]
-    fn triangles_without_area_or_with_nan_are_dropped_and_counted() {
-        let bad = triangle(Vec3::ZERO, Vec3::X, Vec3::X * 2.0);
-        let (mesh, repairs) = build(&bad, vec![0, 1, 2, 0, 0, 1]);
-        assert_eq!(mesh.triangle_count(), 0);
-        assert_eq!(repairs.degenerate_triangles, 2);
-        let nan = triangle(Vec3::ZERO, Vec3::X, Vec3::NAN);
-        let (_, repairs) = build(&nan, vec![0, 1, 2]);
-        assert_eq!(repairs.non_finite_triangles, 1);
-    }
-
-    #[test]
-    fn tiny_and_huge_triangles_have_area() {
-        for scale in [1e-30_f32, 1e-6, 1.0, 1e6, 1e18] {
-            assert!(!has_no_area(Vec3::ZERO, Vec3::X * scale, Vec3::Y * scale), "scale {scale}");
-        }
-    }
-
-    #[test]
-    fn primitives_that_share_attributes_share_vertices() {
-        let mut quad =
-            Attributes { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE], ..Attributes::default() };
-        quad.normals = Some(vec![Vec3::Z; 4]);
-        let quad = Arc::new(quad);
-        let mut builder = MeshBuilder::default();
-        for indices in [vec![0, 1, 2], vec![1, 3, 2]] {
-            let input = PrimitiveInput {
-                attributes: &quad,
-                indices,
-                material: MaterialId(0),
-                normal_map_tex_coord: None,
-            };
-            assert_eq!(builder.add(input), Ok(true));
-        }
-        let mesh = builder.finish(String::new());
-        assert_eq!(mesh.data.positions.len(), 4);
-        assert_eq!(mesh.primitives.len(), 2);
-    }
-}
+mod tests;

@@ -11,6 +11,7 @@ use tobj::{LoadOptions, Model};
 
 use super::geometry::{Attributes, MeshBuilder, PrimitiveInput};
 use super::gltf::buffers::read_file;
+use super::room::Room;
 use super::{
     ImportError, ImportOptions, Imported, UTF16, Warning, counted, file_stem, is_utf16, read_model_file,
     short, uri,
@@ -61,6 +62,7 @@ pub(super) fn load(
     let Tidy { text, smooth, materials: used, short_faces, other_elements, calls } =
         lines::tidy(&lines::text_of(&bytes))
             .map_err(|(line, reason)| ImportError::new(path, reason).at(format!("line {line}")))?;
+    let room = Room::new(bytes.len(), 0);
     let folder = path.parent().unwrap_or(Path::new(""));
     progress("reading faces", 0.1);
     let warnings = Warnings::default();
@@ -94,7 +96,7 @@ pub(super) fn load(
     let mut parts = Vec::new();
     for object in models.chunk_by(|a, b| a.name == b.name) {
         let warn = |place: String, message: String| warnings.add(path, place, message);
-        let mesh = read_object(object, &imported.materials, default_material, smooth, &warn)
+        let mesh = read_object(object, &imported.materials, default_material, smooth, &room, &warn)
             .map_err(|reason| ImportError::new(path, reason))?;
         if mesh.primitives.is_empty() {
             continue;
@@ -217,10 +219,11 @@ fn read_object(
     materials: &[Material],
     default_material: usize,
     smooth: bool,
+    room: &Room,
     warn: &dyn Fn(String, String),
 ) -> Result<Mesh, String> {
     let name = models.first().map_or("", |model| model.name.as_str());
-    let mut builder = MeshBuilder::default();
+    let mut builder = MeshBuilder::within(room);
     for Model { mesh, .. } in models {
         let attributes = read_attributes(mesh, smooth);
         let count = attributes.positions.len();
@@ -240,9 +243,7 @@ fn read_object(
                 .and_then(|material| material.normal_texture)
                 .map(|texture| texture.tex_coord),
         };
-        builder
-            .add(input)
-            .map_err(|_| format!("object {} has more vertices than 32 bits can count", short(name)))?;
+        builder.add(input).map_err(|too_large| format!("object {}: {too_large}", short(name)))?;
     }
     let repairs = builder.repairs;
     let removed = repairs.degenerate_triangles + repairs.non_finite_triangles;
@@ -259,7 +260,7 @@ fn read_object(
             ),
         );
     }
-    Ok(builder.finish(name.to_owned()))
+    builder.finish(name.to_owned()).map_err(|too_large| format!("object {}: {too_large}", short(name)))
 }
 
 fn read_attributes(mesh: &tobj::Mesh, smooth: bool) -> Attributes {

@@ -150,8 +150,8 @@ pub fn animated(folder: &Path) -> Scene {
         part,
         path,
         interpolation: Interpolation::Linear,
-        times_s: times_s.to_vec(),
-        values: values.to_vec(),
+        times_s: times_s.into(),
+        values: values.into(),
     };
     let turned = [[0.0, 0.0, 0.0, 1.0], quarter].concat();
     let clips = [

@@ -298,7 +298,7 @@ fn clips_that_begin_before_zero_play_the_same_from_zero_on() {
         let channel = imported.prefab.animations[0].channels[0].clone();
         assert_eq!((channel.times_s[0], channel.times_s.len()), (0.0, keys), "case {number}");
         let whole =
-            caustica_scene::Channel { times_s: times.to_vec(), values: values.to_vec(), ..channel.clone() };
+            caustica_scene::Channel { times_s: times.into(), values: values.into(), ..channel.clone() };
         for step in 0..40 {
             let time_s = f64::from(step) * 0.1;
             let (cut, uncut) = (channel.sample(time_s).unwrap(), whole.sample(time_s).unwrap());

@@ -71,7 +71,7 @@ fn held(heights_m: &[f32]) -> SkinData {
 
 /// Every joint turns a little against the one below it, as sea grass does.
 fn sway(phase_rad: f32) -> Animation {
-    let times_s: Vec<f32> = (0..KEYS).map(|key| f32::from(key) * KEY_S).collect();
+    let times_s: Arc<[f32]> = (0..KEYS).map(|key| f32::from(key) * KEY_S).collect();
     let turn = |joint: u32, time_s: f32| {
         let angle_rad = 0.08 * (time_s * std::f32::consts::PI + joint as f32 * 0.4 + phase_rad).sin();
         Quat::from_rotation_z(angle_rad).to_array()
@@ -81,7 +81,7 @@ fn sway(phase_rad: f32) -> Animation {
         path: ChannelPath::Rotation,
         interpolation: Interpolation::Linear,
         values: times_s.iter().flat_map(|time_s| turn(joint, *time_s)).collect(),
-        times_s: times_s.clone(),
+        times_s: Arc::clone(&times_s),
     };
     Animation::new("sway", (0..JOINTS).map(channel).collect())
 }

@@ -172,8 +172,8 @@ fn moves(part: u32) -> Channel {
         part,
         path: ChannelPath::Translation,
         interpolation: Interpolation::Linear,
-        times_s: vec![0.0, 2.0],
-        values: vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        times_s: [0.0, 2.0].into(),
+        values: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0].into(),
     }
 }
 

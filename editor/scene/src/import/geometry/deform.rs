@@ -17,6 +17,31 @@ pub(in crate::import) struct Deltas {
     pub tangents: Option<Vec<Vec3>>,
 }
 
+/// Bytes that lists lack to have an entry for `count` vertices: those that `new` brings, or all that there are.
+pub(super) fn missing(data: &MeshData, new: Option<&Attributes>, count: usize) -> usize {
+    let lacks = |length: usize, size: usize| count.saturating_sub(length).saturating_mul(size);
+    let held = data.skin.as_ref().map_or(0, |skin| skin.joints.len());
+    let wanted = new.map_or(data.skin.is_some(), |new| new.skin.is_some());
+    let skin = if wanted { lacks(held, size_of::<Hold>()) } else { 0 };
+    let none = MorphTarget::default();
+    let targets = new.map_or(data.morph.len(), |new| new.targets.len());
+    let deltas = (0..targets).flat_map(|place| {
+        let target = data.morph.get(place).unwrap_or(&none);
+        let lengths = [&target.positions, &target.normals, &target.tangents].map(Vec::len);
+        let deltas = new.and_then(|new| new.targets.get(place));
+        let brought = deltas.map(|d| [&d.positions, &d.normals, &d.tangents].map(Option::is_some));
+        lengths.into_iter().zip(brought.unwrap_or(lengths.map(|length| length > 0)))
+    });
+    let deltas = deltas.filter(|(_, wanted)| *wanted).map(|(length, _)| lacks(length, size_of::<Vec3>()));
+    deltas.fold(skin, usize::saturating_add)
+}
+
+/// How many joints the vertices name at most; 0 where none holds any.
+pub(super) fn joint_count(new: &Attributes) -> usize {
+    let joints = new.skin.iter().flatten().flat_map(|(joints, _)| joints);
+    joints.max().map_or(0, |largest| usize::from(*largest) + 1)
+}
+
 /// Vertices of earlier primitives without joints are held by none.
 pub(super) fn append_skin(data: &mut MeshData, new: &Attributes, base: usize) {
     let Some(entries) = &new.skin else {

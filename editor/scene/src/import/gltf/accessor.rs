@@ -2,17 +2,21 @@
 //! cannot leave them. In: JSON and buffers. Out: floats and indices, whatever the file stored.
 //! Format: glTF 2.0, section 3.6.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::hash::Hash;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use super::buffers::Buffers;
 use super::check::Counts;
 use super::compressed;
 use super::json::{Fault, Item};
 use crate::foreign::Numbers;
+use crate::import::room::Room;
 use crate::import::short;
 
 /// Most elements of an accessor that no bytes stand behind.
 const MAX_UNBACKED_COUNT: usize = 1 << 24;
-/// Bytes of 16 components of 4 bytes.
-const MAX_ELEMENT_BYTES: usize = 64;
 
 /// Type of one component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,6 +99,12 @@ impl Accessor {
         self.span.is_some() || self.sparse.is_some()
     }
 
+    /// The floats that the bytes of an element stand for.
+    fn floats_of(&self, element: &[u8]) -> impl Iterator<Item = f32> {
+        let (component, normalized) = (self.component, self.normalized);
+        element.chunks_exact(component.bytes()).map(move |bytes| float(component, normalized, bytes))
+    }
+
     /// Bytes of all elements.
     pub fn byte_length(&self) -> usize {
         self.count.saturating_mul(self.width * self.component.bytes())
@@ -111,6 +121,24 @@ impl Accessor {
 pub(super) struct Accessors<'a> {
     buffers: &'a Buffers,
     list: Vec<Accessor>,
+    flat: Made<usize, f32>,
+    plain: Made<(usize, bool), u8>,
+}
+
+/// Lists that several share, by what they are made from.
+type Made<K, T> = Mutex<HashMap<K, Arc<[T]>>>;
+
+/// The list of this key, made by the first who asks; others wait, so that it is counted once.
+fn once<K: Hash + Eq, T>(
+    made: &Made<K, T>,
+    key: K,
+    make: impl FnOnce() -> Result<Vec<T>, Fault>,
+) -> Result<Arc<[T]>, Fault> {
+    let mut made = made.lock().unwrap_or_else(PoisonError::into_inner);
+    Ok(match made.entry(key) {
+        Entry::Occupied(known) => Arc::clone(known.get()),
+        Entry::Vacant(place) => Arc::clone(place.insert(make()?.into())),
+    })
 }
 
 /// A buffer view, checked against its buffer.
@@ -168,7 +196,7 @@ impl<'a> Accessors<'a> {
         let mut list: Vec<Accessor> =
             root.objects("accessors")?.iter().map(|item| accessor(item, views)).collect::<Result<_, _>>()?;
         compressed::primitives(root, buffers, views, &mut list)?;
-        Ok(Self { buffers, list })
+        Ok(Self { buffers, list, flat: Made::default(), plain: Made::default() })
     }
 
     /// The bytes of the file, and what was decompressed of it.
@@ -181,24 +209,42 @@ impl<'a> Accessors<'a> {
         self.list.get(index).ok_or_else(|| Fault::new("/accessors", format!("there is no accessor {index}")))
     }
 
+    /// What the file may still take in memory, asked for what is at `place`.
+    pub fn take(&self, count: usize, size: usize, place: &str) -> Result<(), Fault> {
+        self.buffers.room().take(count, size).map_err(|no_room| Fault::new(place, no_room.to_string()))
+    }
+
+    /// What the file may still take in memory.
+    pub const fn room(&self) -> &'a Room {
+        self.buffers.room()
+    }
+
     /// The elements as `N` floats each: integers are converted as `normalized` says, missing components are
     /// `fill`.
     pub fn floats<const N: usize>(&self, index: usize, fill: f32) -> Result<Vec<[f32; N]>, Fault> {
         let accessor = self.get(index)?;
-        let read = |element: &[u8]| {
+        let mut zero = [fill; N];
+        zero.iter_mut().take(accessor.width).for_each(|v| *v = 0.0);
+        self.elements(accessor, zero, |element| {
             let mut out = [fill; N];
-            let components = element.chunks_exact(accessor.component.bytes());
-            for (to, from) in out.iter_mut().zip(components) {
-                *to = float(accessor.component, accessor.normalized, from);
-            }
+            out.iter_mut().zip(accessor.floats_of(element)).for_each(|(to, from)| *to = from);
             out
-        };
-        let zero = {
-            let mut zero = [fill; N];
-            zero.iter_mut().take(accessor.width).for_each(|v| *v = 0.0);
-            zero
-        };
-        self.elements(accessor, zero, read)
+        })
+    }
+
+    /// The elements as floats, one after the other; each list is made once for all who ask.
+    pub fn flat_floats(&self, index: usize) -> Result<Arc<[f32]>, Fault> {
+        let accessor = self.get(index)?;
+        once(&self.flat, index, || {
+            let length = accessor.count.saturating_mul(accessor.width);
+            self.take(length, size_of::<f32>(), &accessor.place)?;
+            let mut floats = vec![0.0; length];
+            self.each(accessor, |at, element| {
+                let own = floats.iter_mut().skip(at * accessor.width);
+                own.zip(accessor.floats_of(element)).for_each(|(to, from)| *to = from);
+            })?;
+            Ok(floats)
+        })
     }
 
     /// The elements of four unsigned components each.
@@ -225,23 +271,10 @@ impl<'a> Accessors<'a> {
         self.elements(accessor, 0, |element| whole(component, element))
     }
 
-    /// The elements as they stand in the file; `as_floats`: as the floats that they stand for.
+    /// The elements as they stand in the file; `as_floats`: as the floats that they stand for. They are made once for all
+    /// who ask.
     pub fn numbers(&self, index: usize, as_floats: bool) -> Result<Numbers, Fault> {
         let accessor = self.get(index)?;
-        let size = accessor.width * accessor.component.bytes();
-        let bytes: Vec<u8> = if as_floats {
-            let floats = self.floats::<16>(index, 0.0)?;
-            let own = floats.iter().flat_map(|element| element.iter().take(accessor.width));
-            own.flat_map(|value| value.to_le_bytes()).collect()
-        } else {
-            let read = |element: &[u8]| {
-                let mut out = [0; MAX_ELEMENT_BYTES];
-                out.iter_mut().zip(element).for_each(|(to, from)| *to = *from);
-                out
-            };
-            let elements = self.elements(accessor, [0; MAX_ELEMENT_BYTES], read)?;
-            elements.iter().flat_map(|element| element.iter().take(size)).copied().collect()
-        };
         let kind = match (accessor.width, accessor.is_matrix) {
             (1, _) => "SCALAR",
             (2, _) => "VEC2",
@@ -256,8 +289,25 @@ impl<'a> Accessors<'a> {
             kind,
             normalized: accessor.normalized && !as_floats,
             count: accessor.count,
-            bytes: bytes.into(),
+            bytes: once(&self.plain, (index, as_floats), || self.bytes(accessor, as_floats))?,
         })
+    }
+
+    fn bytes(&self, accessor: &Accessor, as_floats: bool) -> Result<Vec<u8>, Fault> {
+        let component = if as_floats { Component::F32 } else { accessor.component };
+        let size = accessor.width * component.bytes();
+        self.take(accessor.count, size, &accessor.place)?;
+        let mut bytes = vec![0; accessor.count.saturating_mul(size)];
+        self.each(accessor, |at, element| {
+            let own = bytes.iter_mut().skip(at * size).take(size);
+            if as_floats {
+                let floats = accessor.floats_of(element).flat_map(f32::to_le_bytes);
+                own.zip(floats).for_each(|(to, from)| *to = from);
+            } else {
+                own.zip(element).for_each(|(to, from)| *to = *from);
+            }
+        })?;
+        Ok(bytes)
     }
 
     fn elements<T: Copy>(
@@ -266,32 +316,47 @@ impl<'a> Accessors<'a> {
         zero: T,
         read: impl Fn(&[u8]) -> T,
     ) -> Result<Vec<T>, Fault> {
+        self.take(accessor.count, size_of::<T>(), &accessor.place)?;
+        let mut elements = vec![zero; accessor.count];
+        self.each(accessor, |at, element| {
+            elements.get_mut(at).into_iter().for_each(|to| *to = read(element));
+        })?;
+        Ok(elements)
+    }
+
+    /// Gives each element that is not zero with its place; what a sparse accessor replaces comes twice.
+    fn each(&self, accessor: &Accessor, mut put: impl FnMut(usize, &[u8])) -> Result<(), Fault> {
         let size = accessor.width * accessor.component.bytes();
-        let mut elements = match accessor.span {
-            None => vec![zero; accessor.count],
-            Some(span) => self.chunks(span, size, accessor.count).map(&read).collect(),
-        };
-        if elements.len() != accessor.count {
-            return Err(Fault::new(&accessor.place, "it reaches past its buffer"));
+        if let Some(span) = accessor.span {
+            let mut count = 0;
+            for element in self.chunks(span, size, accessor.count) {
+                put(count, element);
+                count += 1;
+            }
+            if count != accessor.count {
+                return Err(Fault::new(&accessor.place, "it reaches past its buffer"));
+            }
         }
         let Some(sparse) = accessor.sparse else {
-            return Ok(elements);
+            return Ok(());
         };
         let index_size = sparse.index_component.bytes();
         let indices = self.chunks(sparse.indices, index_size, sparse.count);
         let values = self.chunks(sparse.values, size, sparse.count);
-        let mut last = None;
+        let mut next = 0;
         for (index, value) in indices.zip(values) {
-            let index = whole(sparse.index_component, index);
+            let index = whole(sparse.index_component, index) as usize;
             let fault = |reason: &str| Fault::new(format!("{}/sparse", accessor.place), reason);
-            if last.is_some_and(|last| index <= last) {
+            if index < next {
                 return Err(fault("the indices do not grow"));
             }
-            last = Some(index);
-            *elements.get_mut(index as usize).ok_or_else(|| fault("an index lies past the end"))? =
-                read(value);
+            if index >= accessor.count {
+                return Err(fault("an index lies past the end"));
+            }
+            next = index + 1;
+            put(index, value);
         }
-        Ok(elements)
+        Ok(())
     }
 
     fn chunks(&self, span: Span, size: usize, count: usize) -> impl Iterator<Item = &'a [u8]> {

@@ -96,6 +96,8 @@ impl Reader<'_> {
                         self.warn_about(&channel, &read, warnings);
                         let first_s = read.times_s.first().copied().filter(|first_s| *first_s < 0.0);
                         if let Some(first_s) = first_s {
+                            let numbers = read.times_s.len() + read.values.len();
+                            self.accessors.take(numbers, size_of::<f32>(), channel.place())?;
                             read.begin_at_zero();
                             let reason =
                                 format!("its times begin at {first_s} s; what is before 0 is left out");
@@ -176,6 +178,7 @@ impl Reader<'_> {
         if let Err(reason) = sound(&channel, width) {
             return Ok(Err(reason));
         }
+        self.accessors.take(targets.len(), size_of::<Channel>(), target.place())?;
         // Another node of the same mesh, light or camera has the same widths.
         Ok(Ok(targets.into_iter().map(|(part, path)| Channel { part, path, ..channel.clone() }).collect()))
     }
@@ -232,13 +235,13 @@ impl Reader<'_> {
         mesh.and_then(|mesh| self.meshes.get(mesh.0 as usize)).map_or(0, |mesh| mesh.data.morph.len())
     }
 
-    fn read_times(&self, sampler: &Item<'_>) -> Result<Result<Vec<f32>, String>, Fault> {
+    fn read_times(&self, sampler: &Item<'_>) -> Result<Result<Arc<[f32]>, String>, Fault> {
         let index = sampler.required_size("input")?;
         let accessor = self.accessors.get(index)?;
         if accessor.component != Component::F32 || accessor.width != 1 {
             return Ok(Err(format!("accessor {index} of its times has no single floats")));
         }
-        let times_s: Vec<f32> = self.accessors.floats::<1>(index, 0.0)?.into_iter().flatten().collect();
+        let times_s = self.accessors.flat_floats(index)?;
         let grow = times_s.array_windows::<2>().all(|[a, b]| a < b);
         Ok(match grow && times_s.iter().all(|time_s| time_s.is_finite()) {
             true => Ok(times_s),
@@ -252,15 +255,14 @@ impl Reader<'_> {
         sampler: &Item<'_>,
         path: ChannelPath,
         width: usize,
-    ) -> Result<Result<Vec<f32>, String>, Fault> {
+    ) -> Result<Result<Arc<[f32]>, String>, Fault> {
         let index = sampler.required_size("output")?;
         let accessor = self.accessors.get(index)?;
         let wanted = if path == ChannelPath::Weights { 1 } else { width };
         if accessor.is_matrix || accessor.width != wanted || accessor.component == Component::U32 {
             return Ok(Err(format!("accessor {index} of its values has the wrong type")));
         }
-        let values = self.accessors.floats::<4>(index, 0.0)?;
-        let values: Vec<f32> = values.iter().flat_map(|value| value.iter().take(wanted)).copied().collect();
+        let values = self.accessors.flat_floats(index)?;
         Ok(match values.iter().all(|value| value.is_finite()) {
             true => Ok(values),
             false => Err(format!("a value in accessor {index} is not finite")),

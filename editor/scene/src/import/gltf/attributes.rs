@@ -114,8 +114,7 @@ impl<'a> AttributeReader<'a> {
         count: usize,
         warnings: &mut Vec<Fault>,
     ) -> Result<Vec<Hold>, Fault> {
-        let mut holds: Vec<Vec<(u32, f32)>> = vec![Vec::new(); count];
-        let mut repaired = 0_usize;
+        let mut read = Vec::new();
         for (joints_name, weights_name) in sets {
             let Some((joints, weights)) = self.checked(item, joints_name, &[4], count)?.zip(self.checked(
                 item,
@@ -128,16 +127,25 @@ impl<'a> AttributeReader<'a> {
             self.require(item, joints_name, joints, |a| {
                 matches!(a.component, Component::U8 | Component::U16)
             })?;
-            let read =
-                self.accessors.quadruples(joints)?.into_iter().zip(self.accessors.floats::<4>(weights, 0.0)?);
-            for (hold, (joints, weights)) in holds.iter_mut().zip(read) {
+            read.push((self.accessors.quadruples(joints)?, self.accessors.floats::<4>(weights, 0.0)?));
+        }
+        self.accessors.take(count, size_of::<Hold>(), item.place())?;
+        let mut holds = Vec::with_capacity(count);
+        let (mut repaired, mut cut, mut free) = (0_usize, 0_usize, 0_usize);
+        let mut hold: Vec<(u32, f32)> = Vec::new();
+        for vertex in 0..count {
+            hold.clear();
+            let sets =
+                read.iter().filter_map(|(joints, weights)| joints.get(vertex).zip(weights.get(vertex)));
+            for (joints, weights) in sets {
                 repaired += weights.iter().filter(|weight| !(weight.is_finite() && **weight >= 0.0)).count();
-                let pairs = joints.into_iter().zip(weights);
+                let pairs = joints.iter().copied().zip(weights.iter().copied());
                 hold.extend(pairs.filter(|(_, weight)| weight.is_finite() && *weight > 0.0));
             }
+            cut += usize::from(hold.len() > 4);
+            free += usize::from(hold.is_empty());
+            holds.push(strongest(&mut hold));
         }
-        let cut = holds.iter().filter(|hold| hold.len() > 4).count();
-        let free = holds.iter().filter(|hold| hold.is_empty()).count();
         for (number, what) in [
             (repaired, "weights are negative or not finite and count as 0"),
             (cut, "vertices have more than 4 joints; the 4 strongest are kept"),
@@ -147,7 +155,7 @@ impl<'a> AttributeReader<'a> {
                 warnings.push(item.fault(format!("{number} {what}")));
             }
         }
-        Ok(holds.into_iter().map(strongest).collect())
+        Ok(holds)
     }
 
     /// The accessor behind a name, if it is there and fits.
@@ -249,14 +257,14 @@ fn key_of(base: &Item<'_>, targets: &[Item<'_>], sets: &[(String, String)]) -> R
 }
 
 /// At most four holds, their weights made a sum of 1; all zero when there are none.
-fn strongest(mut holds: Vec<(u32, f32)>) -> Hold {
+fn strongest(holds: &mut Vec<(u32, f32)>) -> Hold {
     // Stable, so that equally strong ones keep the order of the file.
     holds.sort_by(|(_, a), (_, b)| b.total_cmp(a));
     holds.truncate(4);
     let sum: f64 = holds.iter().map(|(_, weight)| f64::from(*weight)).sum();
     let sum = if (sum - 1.0).abs() <= SUM_ROUNDING { 1.0 } else { sum };
     let (mut joints, mut weights) = ([0; 4], [0.0; 4]);
-    for ((to_joint, to_weight), (joint, weight)) in joints.iter_mut().zip(&mut weights).zip(holds) {
+    for ((to_joint, to_weight), (joint, weight)) in joints.iter_mut().zip(&mut weights).zip(holds.drain(..)) {
         (*to_joint, *to_weight) = (joint as u16, (f64::from(weight) / sum) as f32);
     }
     (joints, weights)
@@ -268,14 +276,14 @@ mod tests {
 
     #[test]
     fn the_strongest_joints_are_kept_with_weights_of_sum_one() {
-        let holds = vec![(7, 0.1), (8, 0.4), (9, 0.2), (5, 0.2), (6, 0.1), (4, 0.05)];
-        let (joints, weights) = strongest(holds);
+        let mut holds = vec![(7, 0.1), (8, 0.4), (9, 0.2), (5, 0.2), (6, 0.1), (4, 0.05)];
+        let (joints, weights) = strongest(&mut holds);
         assert_eq!(joints, [8, 9, 5, 7]);
         assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
         assert!((weights[0] - 0.4 / 0.9).abs() < 1e-6);
-        assert_eq!(strongest(vec![(3, 0.5)]), ([3, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]));
-        assert_eq!(strongest(Vec::new()), ([0; 4], [0.0; 4]));
+        assert_eq!(strongest(&mut vec![(3, 0.5)]), ([3, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]));
+        assert_eq!(strongest(&mut Vec::new()), ([0; 4], [0.0; 4]));
         // The sum of the largest numbers is more than single precision holds.
-        assert_eq!(strongest(vec![(1, f32::MAX), (2, f32::MAX)]).1, [0.5, 0.5, 0.0, 0.0]);
+        assert_eq!(strongest(&mut vec![(1, f32::MAX), (2, f32::MAX)]).1, [0.5, 0.5, 0.0, 0.0]);
     }
 }

@@ -1,35 +1,45 @@
 //! The bytes behind a glTF file: its binary chunk, data URIs, files beside it.
 //! In: JSON and the folder. Out: byte slices by index. Nothing outside the model's folder is opened.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::super::uri::{Location, resolve};
 use super::compressed;
 use super::json::{Fault, Item};
 use crate::import::require_regular_file;
+use crate::import::room::Room;
 
 /// Largest image file that is read, bytes.
 const MAX_IMAGE_FILE_BYTES: u64 = 1 << 30;
-/// What compressed data may become: this many bytes, and more when the file has more.
-const MIN_DECODED_BYTES: usize = 256 << 20;
-/// Most bytes that a byte of the file may become.
-const MAX_DECODED_RATIO: usize = 64;
 
 /// The buffers of a file.
 pub(super) struct Buffers {
     file: Vec<u8>,
     list: Vec<Source>,
-    /// Bytes that compressed data may still become.
-    decoded_left: usize,
+    room: Room,
 }
 
 enum Source {
     /// A range of the model file itself.
     Chunk(Range<usize>),
     Own(Vec<u8>),
+    /// The beginning of a file that several buffers may name.
+    Shared(Arc<Vec<u8>>, usize),
+}
+
+impl Source {
+    fn len(&self) -> usize {
+        match self {
+            Self::Chunk(range) => range.len(),
+            Self::Own(bytes) => bytes.len(),
+            Self::Shared(bytes, length) => bytes.len().min(*length),
+        }
+    }
 }
 
 impl Buffers {
@@ -40,52 +50,41 @@ impl Buffers {
         binary: Option<Range<usize>>,
         folder: &Path,
     ) -> Result<Self, Fault> {
+        let items = root.objects("buffers")?;
+        let mut files = Files::of(&items, folder)?;
         let mut list = Vec::new();
-        for (index, item) in root.objects("buffers")?.iter().enumerate() {
+        for (index, item) in items.iter().enumerate() {
             let length = item.required_size("byteLength")?;
             if is_fallback(item)? {
                 list.push(Source::Own(Vec::new()));
                 continue;
             }
-            let source = match (item.text("uri")?, &binary) {
-                (Some(uri), _) => Source::Own(read_uri(item, uri, folder, length)?),
+            let mut source = match (item.text("uri")?, &binary) {
+                (Some(uri), _) => files.read(item, uri, folder)?,
                 (None, Some(range)) if index == 0 => Source::Chunk(range.clone()),
                 (None, _) => return Err(item.fault("it has neither a URI nor a binary chunk")),
             };
-            let available = match &source {
-                Source::Chunk(range) => range.len(),
-                Source::Own(bytes) => bytes.len(),
-            };
+            let available = source.len();
             if available < length {
                 return Err(
                     item.fault(format!("byteLength is {length}, but there are only {available} bytes"))
                 );
             }
-            list.push(match source {
-                Source::Chunk(range) => Source::Chunk(range.start..range.start + length),
-                Source::Own(mut bytes) => {
-                    bytes.truncate(length);
-                    Source::Own(bytes)
-                }
-            });
+            match &mut source {
+                Source::Chunk(range) => range.end = range.start + length,
+                Source::Own(bytes) => bytes.truncate(length),
+                Source::Shared(_, shown) => *shown = length,
+            }
+            list.push(source);
         }
-        let bytes = list.iter().map(|source| match source {
-            Source::Chunk(range) => range.len(),
-            Source::Own(bytes) => bytes.len(),
-        });
-        let decoded_left = bytes.sum::<usize>().saturating_mul(MAX_DECODED_RATIO).max(MIN_DECODED_BYTES);
-        Ok(Self { file, list, decoded_left })
+        let beside: usize = files.read.values().map(|bytes| bytes.len()).sum();
+        let room = Room::new(file.len().saturating_add(beside), compressed::stream_bytes(root)?);
+        Ok(Self { file, list, room })
     }
 
-    /// Says that compressed data is about to become so many bytes; refused when it is too much for the file.
-    pub fn claim(&mut self, bytes: usize) -> Result<(), String> {
-        self.decoded_left = self.decoded_left.checked_sub(bytes).ok_or_else(|| {
-            format!(
-                "its compressed data becomes {bytes} bytes, more than the {} that a file of this size may still have",
-                self.decoded_left
-            )
-        })?;
-        Ok(())
+    /// What the file may still take in memory.
+    pub const fn room(&self) -> &Room {
+        &self.room
     }
 
     /// Adds bytes that were decoded; returns the index of the buffer.
@@ -99,6 +98,7 @@ impl Buffers {
         match self.list.get(index) {
             Some(Source::Chunk(range)) => self.file.get(range.clone()).unwrap_or(&[]),
             Some(Source::Own(bytes)) => bytes,
+            Some(Source::Shared(bytes, length)) => bytes.get(..*length).unwrap_or(bytes),
             None => &[],
         }
     }
@@ -112,10 +112,39 @@ fn is_fallback(item: &Item<'_>) -> Result<bool, Fault> {
     }
 }
 
-fn read_uri(item: &Item<'_>, uri: &str, folder: &Path, length: usize) -> Result<Vec<u8>, Fault> {
-    match resolve(uri, folder).map_err(|reason| item.fault(reason))? {
-        Location::Data(bytes) => Ok(bytes),
-        Location::File(path) => read_file(&path, length as u64).map_err(|reason| item.fault(reason)),
+/// The files that buffers name, each read once.
+#[derive(Default)]
+struct Files {
+    /// How much of each some buffer wants.
+    wanted: HashMap<PathBuf, usize>,
+    read: HashMap<PathBuf, Arc<Vec<u8>>>,
+}
+
+impl Files {
+    fn of(items: &[Item<'_>], folder: &Path) -> Result<Self, Fault> {
+        let mut files = Self::default();
+        for item in items {
+            let uri = item.text("uri")?.filter(|uri| !uri.starts_with("data:"));
+            if let Some(Ok(Location::File(path))) = uri.map(|uri| resolve(uri, folder)) {
+                let most = files.wanted.entry(path).or_default();
+                *most = item.required_size("byteLength")?.max(*most);
+            }
+        }
+        Ok(files)
+    }
+
+    fn read(&mut self, item: &Item<'_>, uri: &str, folder: &Path) -> Result<Source, Fault> {
+        let path = match resolve(uri, folder).map_err(|reason| item.fault(reason))? {
+            Location::Data(bytes) => return Ok(Source::Own(bytes)),
+            Location::File(path) => path,
+        };
+        if let Some(known) = self.read.get(&path) {
+            return Ok(Source::Shared(Arc::clone(known), usize::MAX));
+        }
+        let limit = self.wanted.get(&path).copied().unwrap_or_default() as u64;
+        let bytes = Arc::new(read_file(&path, limit).map_err(|reason| item.fault(reason))?);
+        self.read.insert(path, Arc::clone(&bytes));
+        Ok(Source::Shared(bytes, usize::MAX))
     }
 }
 

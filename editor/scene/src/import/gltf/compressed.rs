@@ -22,13 +22,36 @@ pub(super) fn extension<'a>(item: &Item<'a>) -> Result<Option<Item<'a>>, Fault> 
     }
 }
 
+/// Bytes of all streams of a codec that a file names.
+pub(super) fn stream_bytes(root: &Item<'_>) -> Result<usize, Fault> {
+    let items = root.objects("bufferViews")?;
+    let mut bytes = 0_usize;
+    for item in &items {
+        let length = extension(item)?.map(|extension| extension.size("byteLength")).transpose()?.flatten();
+        bytes = bytes.saturating_add(length.unwrap_or(0));
+    }
+    for mesh in root.objects("meshes")? {
+        for primitive in mesh.objects("primitives")? {
+            let Some(extension) = primitive.extension("KHR_draco_mesh_compression")? else { continue };
+            let view = extension.index("bufferView", items.len(), "buffer view")?.and_then(|i| items.get(i));
+            let length = view.map(|view| view.size("byteLength")).transpose()?.flatten();
+            bytes = bytes.saturating_add(length.unwrap_or(0));
+        }
+    }
+    Ok(bytes)
+}
+
+fn take(buffers: &Buffers, item: &Item<'_>, bytes: usize) -> Result<(), Fault> {
+    buffers.room().take(bytes, 1).map_err(|no_room| item.fault(format!("decompressed, {no_room}")))
+}
+
 /// The bytes of buffer views that are compressed; `None` for the others.
-pub(super) fn views(items: &[Item<'_>], buffers: &mut Buffers) -> Result<Vec<Option<Vec<u8>>>, Fault> {
+pub(super) fn views(items: &[Item<'_>], buffers: &Buffers) -> Result<Vec<Option<Vec<u8>>>, Fault> {
     let mut extensions = Vec::with_capacity(items.len());
     for item in items {
         let extension = extension(item)?;
         if extension.is_some() {
-            buffers.claim(item.required_size("byteLength")?).map_err(|reason| item.fault(reason))?;
+            take(buffers, item, item.required_size("byteLength")?)?;
         }
         extensions.push(extension);
     }
@@ -99,7 +122,7 @@ pub(super) fn primitives(
 fn read_primitive<'a>(
     primitive: &Item<'a>,
     extension: Item<'a>,
-    buffers: &mut Buffers,
+    buffers: &Buffers,
     views: &[View],
     accessors: &[Accessor],
 ) -> Result<Option<Draco<'a>>, Fault> {
@@ -123,7 +146,7 @@ fn read_primitive<'a>(
         return Err(extension.fault("of what Draco compressed only lists of triangles (mode 4) are read"));
     }
     let bytes = wanted().fold(0, |sum: usize, accessor| sum.saturating_add(accessor.byte_length()));
-    buffers.claim(bytes).map_err(|reason| extension.fault(reason))?;
+    take(buffers, &extension, bytes)?;
     let vertices = wanted().next().map_or(0, |accessor| accessor.count);
     Ok(Some(Draco { extension, view, vertices, indices, attributes }))
 }
@@ -136,8 +159,8 @@ impl Draco<'_> {
         let View { buffer, start, length, .. } = self.view;
         let stream = buffers.bytes(buffer).get(start..start + length).unwrap_or(&[]);
         let faces = get(self.indices)?.count / 3;
-        let mesh =
-            decode_draco(stream, self.vertices, faces).map_err(|reason| self.extension.fault(reason))?;
+        let mesh = decode_draco(stream, self.vertices, faces, buffers.room().limit())
+            .map_err(|reason| self.extension.fault(reason))?;
         if mesh.num_faces() != faces || mesh.num_points() != self.vertices {
             let reason = format!(
                 "the stream has {} triangles and {} vertices, its accessors have {faces} and {}",
@@ -166,11 +189,16 @@ impl Draco<'_> {
     }
 }
 
-fn decode_draco(stream: &[u8], vertices: usize, faces: usize) -> Result<DracoMesh, String> {
+fn decode_draco(
+    stream: &[u8],
+    vertices: usize,
+    faces: usize,
+    most_bytes: usize,
+) -> Result<DracoMesh, String> {
     let limits = DecodeLimits::default()
         .with_max_points(vertices as u64)
         .with_max_faces(faces as u64)
-        .with_max_decoded_bytes((vertices as u64).saturating_mul(MAX_VERTEX_BYTES));
+        .with_max_decoded_bytes((vertices as u64).saturating_mul(MAX_VERTEX_BYTES).min(most_bytes as u64));
     let mut mesh = DracoMesh::new();
     let mut buffer = DecoderBuffer::new(stream).with_limits(limits);
     let reason = |error| format!("the Draco stream cannot be read: {error}");

@@ -1,9 +1,10 @@
 //! Meshes: accessors to attributes, any triangle topology to lists, then the mesh builder.
 //! In: JSON and checked accessors. Out: meshes and what was repaired. Points and lines are only kept (`loose.rs`).
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use rayon::prelude::*;
+use serde_json::Value;
 
 use super::super::geometry::{MeshBuilder, PrimitiveInput, Repairs};
 use super::accessor::Accessors;
@@ -15,6 +16,11 @@ use crate::assets::{Material, Mesh};
 use crate::foreign::{LooseMesh, Mapping, Unknown};
 use crate::ids::MaterialId;
 use crate::import::counted;
+
+/// Mode of lists of triangles; below are points and lines.
+const TRIANGLES: usize = 4;
+/// The last mode that there is.
+const TRIANGLE_FAN: usize = 6;
 
 /// All meshes, and whether a primitive asked for the default material.
 #[derive(Default)]
@@ -32,7 +38,8 @@ pub(super) struct Meshes {
     pub warnings: Vec<Fault>,
 }
 
-/// Reads all meshes on all cores. A primitive without a material gets the one after the last.
+/// Reads all meshes on all cores; those of the same geometry share it. A primitive without a material gets the one after
+/// the last.
 pub(super) fn read_all(
     root: &Item<'_>,
     accessors: &Accessors<'_>,
@@ -40,38 +47,63 @@ pub(super) fn read_all(
     max_elements: usize,
 ) -> Result<Meshes, Fault> {
     let items = root.objects("meshes")?;
-    let results: Vec<Result<OneMesh, Fault>> =
-        items.par_iter().map(|item| read(item, accessors, materials, max_elements)).collect();
+    let (mut places, mut firsts, mut shape_of) = (HashMap::new(), Vec::new(), Vec::new());
+    for item in &items {
+        let place = *places.entry(geometry_of(item, materials)?).or_insert_with(|| {
+            firsts.push(item);
+            firsts.len() - 1
+        });
+        shape_of.push(place);
+    }
+    let shapes: Vec<Result<Shape, Fault>> =
+        firsts.par_iter().map(|item| Shape::read(item, accessors, materials, max_elements)).collect();
     let mut meshes = Meshes { list: Vec::with_capacity(items.len()), ..Meshes::default() };
-    let mut elements = 0_usize;
-    for (number, (result, item)) in results.into_iter().zip(&items).enumerate() {
-        let one = result?;
-        elements =
-            elements.saturating_add(one.mesh.data.positions.len()).saturating_add(one.mesh.triangle_count());
+    let (mut elements, mut counted) = (0_usize, 0);
+    for (number, (item, place)) in items.iter().zip(shape_of).enumerate() {
+        let Some(shape) = shapes.get(place) else { continue };
+        let shape = shape.as_ref().map_err(Fault::clone)?;
+        if place == counted {
+            counted += 1;
+            let mesh = &shape.mesh;
+            elements =
+                elements.saturating_add(mesh.data.positions.len()).saturating_add(mesh.triangle_count());
+        }
         if elements > max_elements {
             return Err(too_many(item, max_elements));
         }
-        meshes.uses_default_material |= one.uses_default_material;
-        meshes.warnings.extend(one.warnings);
-        let variants = one.variants.into_iter().map(|(primitive, choice)| ((number, primitive), choice));
-        meshes.variants.extend(variants);
-        meshes.unknown.extend(one.unknown.into_iter().map(|(primitive, kept)| ((number, primitive), kept)));
-        meshes.loose.extend(one.loose.map(|loose| (number, loose)));
-        for name in one.lost {
-            *meshes.lost.entry(name).or_default() += 1;
-        }
-        meshes.list.push(one.mesh);
+        meshes.add(number, item, shape, accessors, materials.len())?;
     }
     Ok(meshes)
 }
 
-struct OneMesh {
+/// What the triangles of a mesh are made from: of each primitive its accessors, mode, and the texture coordinates of its
+/// normal map.
+type Geometry<'a> = (Vec<([Option<&'a Value>; 4], Option<u32>)>, Vec<String>);
+
+fn geometry_of<'a>(item: &Item<'a>, materials: &[Material]) -> Result<Geometry<'a>, Fault> {
+    let of_primitive = |primitive: &Item<'a>| {
+        let named = ["attributes", "targets", "indices", "mode"].map(|key| primitive.raw(key));
+        Ok((named, normal_map(primitive, materials)?))
+    };
+    let primitives = item.objects("primitives")?.iter().map(of_primitive).collect::<Result<_, _>>()?;
+    Ok((primitives, item.extra_texts("targetNames")))
+}
+
+/// The set of texture coordinates of its normal map, if it has one.
+fn normal_map(primitive: &Item<'_>, materials: &[Material]) -> Result<Option<u32>, Fault> {
+    let material = primitive.index("material", materials.len(), "material")?;
+    let map = material.and_then(|m| materials.get(m)).and_then(|m| m.normal_texture.as_ref());
+    Ok(map.map(|texture_use| texture_use.tex_coord))
+}
+
+/// What meshes of the same geometry have in common.
+struct Shape {
+    /// Without a name; its primitives have no material yet.
     mesh: Mesh,
-    uses_default_material: bool,
-    variants: Vec<(usize, Vec<Mapping>)>,
-    unknown: Vec<(usize, Unknown)>,
-    loose: Option<LooseMesh>,
-    lost: Vec<String>,
+    /// The place of the first mesh, where its warnings are.
+    place: String,
+    /// Which primitives of the file those of the mesh were.
+    kept: Vec<usize>,
     warnings: Vec<Fault>,
 }
 
@@ -79,86 +111,126 @@ fn too_many(item: &Item<'_>, limit: usize) -> Fault {
     item.fault(format!("more than {limit} vertices and triangles in one file are not read"))
 }
 
-fn read(
-    item: &Item<'_>,
-    accessors: &Accessors<'_>,
-    materials: &[Material],
-    max_elements: usize,
-) -> Result<OneMesh, Fault> {
-    let mut builder = MeshBuilder::default();
-    let mut attribute_reader = AttributeReader::new(accessors, max_elements);
-    let mut warnings = Vec::new();
-    let mut uses_default_material = false;
-    let mut corners = 0_usize;
-    let mut target_counts = BTreeSet::new();
-    let (mut variants, mut strange, mut lost, mut kept) = (Vec::new(), Vec::new(), Vec::new(), 0);
-    let (mut loose, mut loose_left) = (LooseMesh::default(), max_elements);
-    for primitive in item.objects("primitives")? {
-        target_counts.insert(primitive.items("targets")?.len());
-        let mode = primitive.size("mode")?.unwrap_or(4);
-        if mode > 6 {
-            return Err(primitive.fault(format!("mode {mode} does not exist")));
+impl Shape {
+    fn read(
+        item: &Item<'_>,
+        accessors: &Accessors<'_>,
+        materials: &[Material],
+        max_elements: usize,
+    ) -> Result<Self, Fault> {
+        let mut builder = MeshBuilder::within(accessors.room());
+        let mut attribute_reader = AttributeReader::new(accessors, max_elements);
+        let (mut warnings, mut kept) = (Vec::new(), Vec::new());
+        let mut corners = 0_usize;
+        let mut target_counts = BTreeSet::new();
+        for (number, primitive) in item.objects("primitives")?.iter().enumerate() {
+            target_counts.insert(primitive.items("targets")?.len());
+            let mode = primitive.size("mode")?.unwrap_or(TRIANGLES);
+            if mode > TRIANGLE_FAN {
+                return Err(primitive.fault(format!("mode {mode} does not exist")));
+            }
+            if mode < TRIANGLES {
+                continue;
+            }
+            let Some(attributes) = attribute_reader.read(primitive, &mut warnings)? else {
+                warnings.push(primitive.fault("it has no POSITION; it was left out"));
+                continue;
+            };
+            let indices = read_triangles(primitive, accessors, mode, attributes.positions.len())?;
+            corners = corners.saturating_add(indices.len());
+            if corners / 3 > max_elements {
+                return Err(too_many(primitive, max_elements));
+            }
+            let input = PrimitiveInput {
+                attributes: &attributes,
+                indices,
+                material: MaterialId::default(),
+                normal_map_tex_coord: normal_map(primitive, materials)?,
+            };
+            if builder.add(input).map_err(|too_large| primitive.fault(too_large.to_string()))? {
+                kept.push(number);
+            } else {
+                warnings.push(primitive.fault("no triangle with an area is left; it was left out"));
+            }
         }
-        if mode < 4 {
-            let read = loose::read(&primitive, accessors, mode, materials.len(), &mut loose_left)?;
-            loose.primitives.push(read);
-            continue;
+        warnings.extend(repair_warnings(item, &builder.repairs));
+        if target_counts.len() > 1 {
+            warnings.push(
+                item.fault("its primitives differ in their number of morph targets; missing ones do nothing"),
+            );
         }
-        let Some(attributes) = attribute_reader.read(&primitive, &mut warnings)? else {
-            warnings.push(primitive.fault("it has no POSITION; it was left out"));
-            continue;
-        };
-        let indices = read_triangles(&primitive, accessors, mode, attributes.positions.len())?;
-        corners = corners.saturating_add(indices.len());
-        if corners / 3 > max_elements {
-            return Err(too_many(&primitive, max_elements));
-        }
-        let material = primitive.index("material", materials.len(), "material")?;
-        uses_default_material |= material.is_none();
-        let normal_map = material.and_then(|m| materials.get(m)).and_then(|m| m.normal_texture.as_ref());
-        let input = PrimitiveInput {
-            attributes: &attributes,
-            indices,
-            material: MaterialId(material.unwrap_or(materials.len()) as u64),
-            normal_map_tex_coord: normal_map.map(|texture_use| texture_use.tex_coord),
-        };
-        let added = builder
-            .add(input)
-            .map_err(|_| primitive.fault("the mesh has more vertices than 32 bits can count"))?;
-        if !added {
-            warnings.push(primitive.fault("no triangle with an area is left; it was left out"));
-            continue;
-        }
-        if let Some(extension) = primitive.extension("KHR_materials_variants")? {
-            variants.push((kept, read_mappings(&extension, materials.len())?));
-        }
-        strange.push((kept, unknown(&primitive, &[])));
-        lost.extend(lost_attributes(&primitive)?);
-        kept += 1;
+        builder.name_targets(item.extra_texts("targetNames"));
+        let mesh = builder.finish(String::new()).map_err(|too_large| item.fault(too_large.to_string()))?;
+        Ok(Self { mesh, place: item.place().to_owned(), kept, warnings })
     }
-    strange.retain(|(_, unknown)| !unknown.is_empty());
-    match loose.primitives.len() {
-        0 => {}
-        count => warnings.push(item.fault(format!(
-            "{} not rendered and only kept for exports",
-            counted(count, "primitive of points or lines is", "primitives of points or lines are")
-        ))),
+
+    /// Its warnings, said of another mesh.
+    fn warnings_of<'a>(&'a self, item: &'a Item<'_>) -> impl Iterator<Item = Fault> + 'a {
+        self.warnings.iter().map(|fault| {
+            let within = fault.place.strip_prefix(&self.place).unwrap_or_default();
+            Fault::new(format!("{}{within}", item.place()), fault.reason.clone())
+        })
     }
-    warnings.extend(repair_warnings(item, &builder.repairs));
-    if target_counts.len() > 1 {
-        warnings.push(
-            item.fault("its primitives differ in their number of morph targets; missing ones do nothing"),
-        );
+}
+
+impl Meshes {
+    /// Adds a mesh: its shape with what is its own.
+    fn add(
+        &mut self,
+        number: usize,
+        item: &Item<'_>,
+        shape: &Shape,
+        accessors: &Accessors<'_>,
+        materials: usize,
+    ) -> Result<(), Fault> {
+        self.warnings.extend(shape.warnings_of(item));
+        let mut mesh = shape.mesh.clone();
+        mesh.name = item.name()?;
+        let primitives = item.objects("primitives")?;
+        let kept = shape.kept.iter().filter_map(|&place| primitives.get(place));
+        for (place, (primitive, made)) in kept.zip(&mut mesh.primitives).enumerate() {
+            let material = primitive.index("material", materials, "material")?;
+            self.uses_default_material |= material.is_none();
+            made.material = MaterialId(material.unwrap_or(materials) as u64);
+            if let Some(extension) = primitive.extension("KHR_materials_variants")? {
+                self.variants.insert((number, place), read_mappings(&extension, materials)?);
+            }
+            let unknown = unknown(primitive, &[]);
+            if !unknown.is_empty() {
+                self.unknown.insert((number, place), unknown);
+            }
+            for name in lost_attributes(primitive)? {
+                *self.lost.entry(name).or_default() += 1;
+            }
+        }
+        let mut loose = LooseMesh::default();
+        for primitive in &primitives {
+            let mode = primitive.size("mode")?.unwrap_or(TRIANGLES);
+            if mode < TRIANGLES {
+                loose.primitives.push(loose::read(primitive, accessors, mode, materials)?);
+            }
+        }
+        if !loose.primitives.is_empty() {
+            self.warnings.push(item.fault(format!(
+                "{} not rendered and only kept for exports",
+                counted(
+                    loose.primitives.len(),
+                    "primitive of points or lines is",
+                    "primitives of points or lines are"
+                )
+            )));
+        }
+        if mesh.primitives.is_empty() && !loose.primitives.is_empty() {
+            loose.weights = item.raw("weights").cloned();
+        } else if let Some(weights) = read_weights(item, mesh.data.morph.len(), &mut self.warnings)? {
+            mesh.default_weights = weights;
+        }
+        if !loose.primitives.is_empty() {
+            self.loose.insert(number, loose);
+        }
+        self.list.push(mesh);
+        Ok(())
     }
-    builder.name_targets(item.extra_texts("targetNames"));
-    let mut mesh = builder.finish(item.name()?);
-    if mesh.primitives.is_empty() && !loose.primitives.is_empty() {
-        loose.weights = item.raw("weights").cloned();
-    } else if let Some(weights) = read_weights(item, mesh.data.morph.len(), &mut warnings)? {
-        mesh.default_weights = weights;
-    }
-    let loose = Some(loose).filter(|loose| !loose.primitives.is_empty());
-    Ok(OneMesh { mesh, uses_default_material, variants, unknown: strange, loose, lost, warnings })
 }
 
 /// Attributes of a primitive of triangles that are not read.
@@ -247,13 +319,19 @@ fn read_triangles(
         .map_err(|_| primitive.fault("it has more vertices than 32 bits can count"))?;
     let order = match primitive.size("indices")? {
         Some(index) => accessors.indices(index)?,
-        None => (0..count).collect(),
+        None => {
+            accessors.take(vertex_count, size_of::<u32>(), primitive.place())?;
+            (0..count).collect()
+        }
     };
     if let Some(bad) = order.iter().find(|&&index| index >= count) {
         return Err(Fault::new(
             format!("{}/indices", primitive.place()),
             format!("vertex index {bad} is out of range, there are {count} vertices"),
         ));
+    }
+    if mode > TRIANGLES {
+        accessors.take(order.len(), 3 * size_of::<u32>(), primitive.place())?;
     }
     Ok(match mode {
         5 => strip(&order),

@@ -13,13 +13,12 @@ use super::mesh::{Meshes, read_weights};
 use crate::assets::{Light, Mesh};
 use crate::foreign::LooseMesh;
 use crate::ids::MeshId;
+use crate::node::MAX_NODES;
 use crate::prefab::{PartNode, SourceScene};
 use crate::transform::{Local, Trs};
 
 mod instances;
 
-/// Most parts that one file may bring, GPU instances counted.
-const MAX_PARTS: usize = 4_000_000;
 /// A rotation this close to unit length is left as it is, bit for bit.
 const UNIT_TOLERANCE: f64 = 1e-14;
 
@@ -206,11 +205,18 @@ impl Reader<'_> {
             }
             _ => None,
         };
+        if part as usize + instances.as_ref().map_or(0, Vec::len) >= MAX_NODES {
+            return Err(item.fault(format!("more than {MAX_NODES} nodes are not read")));
+        }
         let local = read_local(item, &mut tree.warnings)?;
         let target_count =
             mesh.and_then(|mesh| self.meshes.get(mesh.0 as usize)).map(|mesh| mesh.data.morph.len());
         let weights = match target_count {
-            Some(count) if count > 0 => read_weights(item, count, &mut tree.warnings)?,
+            Some(count) if count > 0 && item.raw("weights").is_some() => {
+                let places = instances.as_ref().map_or(0, Vec::len).saturating_add(1);
+                self.accessors.take(count, places.saturating_mul(size_of::<f32>()), item.place())?;
+                read_weights(item, count, &mut tree.warnings)?
+            }
             _ => None,
         };
         tree.parts.push(PartNode {
@@ -237,10 +243,7 @@ impl Reader<'_> {
                 ..PartNode::default()
             });
         }
-        match tree.parts.len() > MAX_PARTS {
-            true => Err(item.fault(format!("more than {MAX_PARTS} nodes are not read"))),
-            false => Ok(()),
-        }
+        Ok(())
     }
 
     fn read_light_of(&self, item: &Item<'_>, part: u32, tree: &mut Tree) -> Result<Option<Light>, Fault> {

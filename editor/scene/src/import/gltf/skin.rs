@@ -101,6 +101,7 @@ fn read_matrices(
         let reason = format!("accessor {index} has {} matrices for {count} joints", accessor.count);
         return Err(Fault::new(place, reason));
     }
+    accessors.take(count, size_of::<DAffine3>(), &place)?;
     let columns = accessors.floats::<16>(index, 0.0)?;
     let matrices = columns.iter().take(count).map(|c| DMat4::from_cols_array(&c.map(f64::from)));
     let matrices: Vec<DMat4> = matrices.collect();

@@ -5,8 +5,10 @@ use glam::{DQuat, DVec3};
 
 use super::super::accessor::Accessors;
 use super::super::json::{Fault, Item};
-use super::{MAX_PARTS, unit};
+use super::unit;
 use crate::import::counted;
+use crate::node::MAX_NODES;
+use crate::prefab::PartNode;
 use crate::transform::Trs;
 
 /// Attributes that are read, and how many numbers each has.
@@ -34,8 +36,8 @@ pub(super) fn read(
         if *count.get_or_insert(accessor.count) != accessor.count {
             return Err(fault("the attributes differ in their count".to_owned()));
         }
-        if accessor.count > MAX_PARTS {
-            return Err(fault(format!("more than {MAX_PARTS} nodes are not read")));
+        if accessor.count > MAX_NODES {
+            return Err(fault(format!("more than {MAX_NODES} nodes are not read")));
         }
         accessors.floats::<4>(index, 0.0).map(Some)
     };
@@ -44,6 +46,7 @@ pub(super) fn read(
     let Some(count) = count else {
         return Ok(None);
     };
+    accessors.take(count, size_of::<Trs>() + size_of::<PartNode>(), extension.place())?;
     let mut instances = vec![Trs::IDENTITY; count];
     let unusable = [
         put(&mut instances, translations, |trs, v| put_vector(&mut trs.translation, v)),

@@ -43,6 +43,8 @@ use surroundings::Surroundings;
 #[derive(Clone, Debug)]
 pub struct Document {
     slots: BTreeMap<NodeId, Slot>,
+    /// Parts of all instances.
+    part_count: usize,
     roots: Vec<NodeId>,
     prefabs: BTreeMap<PrefabId, Prefab>,
     meshes: BTreeMap<MeshId, Mesh>,
@@ -132,6 +134,7 @@ impl Document {
     pub fn new() -> Self {
         Self {
             slots: BTreeMap::new(),
+            part_count: 0,
             roots: Vec::new(),
             prefabs: BTreeMap::new(),
             meshes: BTreeMap::new(),

@@ -8,7 +8,7 @@ use crate::animation::ClipChoice;
 use crate::assets::{Camera, Environment, Light, Material, Mesh, ShapeFault, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target};
-use crate::node::Subtree;
+use crate::node::{MAX_NODES, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage};
 use crate::prefab::Prefab;
 use crate::transform::Local;
@@ -303,6 +303,12 @@ pub enum EditError {
     /// The mesh holds triangles, or another number of primitives than these shapes have.
     #[error("these shapes do not fit that mesh")]
     OtherShapes,
+    /// The document would have more nodes than it may.
+    #[error("the scene would have {count} nodes, those inside of instances counted; it can have {MAX_NODES}")]
+    TooManyNodes {
+        /// How many there would be.
+        count: usize,
+    },
     /// A node cannot hang below itself.
     #[error("a node cannot be moved into itself")]
     Cycle,

@@ -49,7 +49,8 @@ impl Document {
         if !self.prefabs.contains_key(&prefab) {
             return Err(EditError::NoAsset(format!("prefab {}", prefab.0)));
         }
-        self.require_instance(node)?;
+        let before = self.require_instance(node)?;
+        self.require_room(0, self.parts_of(Some(prefab)), self.parts_of(Some(before)))?;
         self.report_removed(node);
         let mut old = prefab;
         if let NodeKind::Prefab { prefab: shown, .. } = &mut self.node_mut(Target::node(node))?.kind {
@@ -64,6 +65,8 @@ impl Document {
     pub(super) fn state_parts(&mut self, node: NodeId) {
         let parts = self.node(node).map(|node| self.part_states(node));
         if let (Some(parts), Some(slot)) = (parts, self.slots.get_mut(&node)) {
+            self.part_count += parts.worlds.len();
+            self.part_count -= slot.parts.worlds.len();
             slot.parts = parts;
         }
         self.mark_dirty(node);

@@ -7,7 +7,7 @@ use super::Document;
 use crate::assets::Material;
 use crate::edit::{Edit, EditError, shown};
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
-use crate::node::NodeKind;
+use crate::node::{MAX_NODES, NodeKind};
 use crate::package::PrefabPackage;
 use crate::prefab::Prefab;
 
@@ -69,6 +69,11 @@ impl Document {
         if let Some(taken) = taken {
             return Err(EditError::Taken(taken));
         }
+        let parts = self.prefabs.values().chain([&package.prefab]).map(|prefab| prefab.nodes().len());
+        let count = parts.sum();
+        if count > MAX_NODES && !self.restoring {
+            return Err(EditError::TooManyNodes { count });
+        }
         let brought = Brought::of(&package);
         self.insert_package(package);
         self.report_users(&brought);
@@ -91,6 +96,8 @@ impl Document {
         let mut old = self.package_of(id).ok_or_else(|| EditError::NoAsset(format!("prefab {}", id.0)))?;
         let instances: Vec<NodeId> =
             self.slots.iter().filter(|(_, slot)| slot.node.prefab() == Some(id)).map(|(id, _)| *id).collect();
+        let parts = |count: usize| count.saturating_mul(instances.len());
+        self.require_room(0, parts(package.prefab.nodes().len()), parts(old.prefab.nodes().len()))?;
         for &node in &instances {
             self.report_removed(node);
         }

@@ -7,8 +7,8 @@ use glam::DAffine3;
 
 use super::{Document, PartStates, Slot};
 use crate::edit::{Edit, EditError};
-use crate::ids::{NodeId, Target};
-use crate::node::{Node, NodeKind, Subtree};
+use crate::ids::{NodeId, PrefabId, Target};
+use crate::node::{MAX_NODES, Node, NodeKind, Subtree};
 use crate::prefab::PartOverride;
 use crate::transform::Local;
 
@@ -26,6 +26,8 @@ impl Document {
             self.require_node(parent)?;
         }
         self.check_subtree(&subtree)?;
+        let parts = subtree.nodes.iter().map(|(_, node)| self.parts_of(node.prefab()));
+        self.require_room(subtree.nodes.len(), parts.fold(0, usize::saturating_add), 0)?;
         let mut ids = Vec::with_capacity(subtree.nodes.len());
         for (id, mut node) in subtree.nodes {
             node.children.clear();
@@ -36,6 +38,7 @@ impl Document {
             }
             self.reserve_ids_up_to(id.0);
             let parts = self.part_states(&node);
+            self.part_count += parts.worlds.len();
             self.slots.insert(id, Slot { node, world: DAffine3::IDENTITY, shown: true, dirty: false, parts });
             ids.push(id);
         }
@@ -58,6 +61,7 @@ impl Document {
             self.report_removed(id);
             self.forget_dirty_parts(id);
             if let Some(slot) = self.slots.remove(&id) {
+                self.part_count -= slot.parts.worlds.len();
                 subtree.nodes.push((id, slot.node));
             }
         }
@@ -210,6 +214,22 @@ impl Document {
                 Err(EditError::NoAsset(format!("mesh {}", mesh.0)))
             }
             _ => Ok(()),
+        }
+    }
+
+    /// How many parts an instance of the prefab has.
+    pub(crate) fn parts_of(&self, prefab: Option<PrefabId>) -> usize {
+        prefab.and_then(|id| self.prefabs.get(&id)).map_or(0, |prefab| prefab.nodes().len())
+    }
+
+    /// Whether so many nodes and parts more, and `fewer` parts, leave the document within what it can have. What was there
+    /// before is there again in any case.
+    pub(crate) fn require_room(&self, nodes: usize, parts: usize, fewer: usize) -> Result<(), EditError> {
+        let have = self.slots.len() + self.part_count;
+        let count = have.saturating_add(nodes).saturating_add(parts).saturating_sub(fewer);
+        match count > MAX_NODES && !self.restoring {
+            true => Err(EditError::TooManyNodes { count }),
+            false => Ok(()),
         }
     }
 

@@ -124,6 +124,7 @@ impl<'a> Loader<'a> {
         for mesh in record.meshes {
             loader.move_primitives(mesh);
         }
+        loader.require_room(&record.nodes)?;
         for node in record.nodes {
             loader.add_node(node)?;
         }
@@ -151,6 +152,13 @@ impl Loader<'_> {
     fn apply(&mut self, place: &str, edit: Edit) -> Result<(), ProjectProblem> {
         let broken = |error: EditError| ProjectProblem::Broken(format!("{place}: {error}"));
         self.document.apply(edit).map(|_| ()).map_err(broken)
+    }
+
+    /// Asked before the first of the nodes takes memory.
+    fn require_room(&self, nodes: &[NodeRecord]) -> Result<(), ProjectProblem> {
+        let parts = nodes.iter().map(|node| self.document.parts_of(node.prefab));
+        let room = self.document.require_room(nodes.len(), parts.fold(0, usize::saturating_add), 0);
+        room.map_err(|error| ProjectProblem::Broken(format!("nodes: {error}")))
     }
 
     /// Where a path of the project leads, or why it is not followed. Noted when permission could be given.

@@ -1,9 +1,11 @@
-//! What is there in great numbers: warnings of one kind, depth of `extras`.
+//! What is there in great numbers: nodes of a document, warnings of one kind, depth of `extras`.
 
 use std::path::{Path, PathBuf};
 
 use caustica_scene::import::{ImportOptions, load};
-use caustica_scene::{Document, Local, export};
+use caustica_scene::{
+    Document, Edit, EditError, Local, Node, NodeId, NodeKind, Project, ProjectMeta, Subtree, export,
+};
 use serde_json::{Value, json};
 
 /// A file of one triangle that so many nodes place, with these members too.
@@ -18,6 +20,63 @@ fn write(folder: &Path, nodes: usize, members: Value) -> PathBuf {
     let path = folder.join("many.gltf");
     std::fs::write(&path, file.to_string()).unwrap();
     path
+}
+
+/// A document with the file as a prefab that nothing places, and the edit that places it so many times.
+fn crowd(source: &Path, count: usize) -> (Document, Edit) {
+    let mut document = Document::new();
+    let prefab = document.add_imported(load(source, &ImportOptions::default()).unwrap()).unwrap();
+    let node = |document: &mut Document| {
+        (NodeId(document.allocate_id()), Node::new("", NodeKind::instance_of(prefab)))
+    };
+    let top = NodeId(document.allocate_id());
+    let mut nodes = vec![(top, Node::new("all", NodeKind::Group))];
+    for _ in 0..count {
+        let (id, node) = node(&mut document);
+        nodes.push((id, Node { parent: Some(top), ..node }));
+    }
+    (document, Edit::AddNode { parent: None, index: 0, subtree: Subtree { nodes } })
+}
+
+#[test]
+fn the_nodes_of_all_instances_of_a_document_are_limited() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = write(folder.path(), 20_000, json!({}));
+    let (mut document, edit) = crowd(&source, 200);
+    let before = document.clone();
+    let refused = document.apply(Edit::batch("many", vec![edit]));
+    assert_eq!(refused, Err(EditError::TooManyNodes { count: 4_000_201 }));
+    assert!(document == before, "the document stays as it was");
+    // What is taken away no longer counts.
+    let (mut document, edit) = crowd(&source, 100);
+    let undo = document.apply(edit.clone()).unwrap();
+    document.apply(undo).unwrap();
+    document.apply(edit).unwrap();
+    let other = document.clone();
+    let merged = document.merge_edit(&other, "twice").unwrap();
+    assert_eq!(document.apply(merged.edit), Err(EditError::TooManyNodes { count: 4_000_202 }));
+    assert!(document == other, "the document stays as it was");
+}
+
+#[test]
+fn a_project_of_more_nodes_than_a_document_has_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = write(folder.path(), 20_000, json!({}));
+    let mut document = Document::new();
+    let prefab = document.add_imported(load(&source, &ImportOptions::default()).unwrap()).unwrap();
+    let (_, edit) = document.instantiate_edit(prefab, None, Local::default());
+    document.apply(edit).unwrap();
+    let path = folder.path().join("p.caustica.json");
+    Project::save(&path, &document, &ProjectMeta::default()).unwrap();
+    let mut project: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    let nodes = project["nodes"].as_array_mut().unwrap();
+    for id in 0..1000 {
+        let node = json!({"id": 1_000_000 + id, "name": "n", "prefab": nodes[0]["prefab"]});
+        nodes.push(node);
+    }
+    std::fs::write(&path, project.to_string()).unwrap();
+    let error = Project::load(&path).unwrap_err().to_string();
+    assert!(error.contains("p.caustica.json") && error.contains("20021001 nodes"), "{error}");
 }
 
 #[test]

@@ -25,7 +25,7 @@ use caustica_scene::{Document, Edit, EditError, Local, NodeId, PrefabId, Recover
 use glam::DVec3;
 
 pub use camera::ViewCamera;
-pub use files::{Loaded, environment_argument, load};
+pub use files::{Arrived, Loaded, environment_argument, load};
 pub use host_times::{HostTimes, Lap};
 pub use tally::Tally;
 
@@ -370,20 +370,19 @@ impl Session {
     }
 
     /// Brings what was loaded into the scene as one undo step: a model or project becomes a new node, an environment
-    /// replaces the present one. Returns the new node.
+    /// replaces the present one. A model that the scene has already becomes another instance of it.
     ///
     /// # Errors
     /// When the edit does not fit, or the scene with it on the device; the document stays as it was.
-    pub fn import(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<Option<NodeId>> {
+    pub fn import(&mut self, path: &Path, loaded: Loaded) -> anyhow::Result<Arrived> {
         let was_empty = self.scene.document.node_count() == 0;
         let brought = files::import(Arc::make_mut(&mut self.scene.document), path, loaded)?;
-        let (edit, node) = (brought.edit, brought.node);
-        self.push_with_room(edit)?;
+        self.push_with_room(brought.edit)?;
         self.scene.keep_of(&brought.kept, Some);
         if was_empty {
             self.camera = ViewCamera::of_document(&self.scene.document, None, self.aspect());
         }
-        Ok(node)
+        Ok(Arrived { node: brought.node, changed: brought.changed })
     }
 
     /// Applies an edit that brings meshes, when the device has room for the scene with them.

@@ -162,7 +162,7 @@ fn an_import_costs_what_it_brings_and_not_the_scene() {
     let import = |session: &mut Session| {
         least(7, || {
             let loaded = loaded.clone();
-            let taken = timed(|| assert!(session.import(&cube, loaded).expect("room").is_some()));
+            let taken = timed(|| assert!(session.import(&cube, loaded).expect("room").node.is_some()));
             frame(session);
             taken
         })

@@ -110,6 +110,21 @@ fn put_ids(document: &mut Document, mut imported: Imported, old: Option<&Prefab>
 }
 
 impl PrefabPackage {
+    /// Whether the assets are those of another reading, but for edits.
+    fn has_source_of(&self, now: &Self) -> bool {
+        let original = |(id, entry): &(MaterialId, MaterialEntry)| (*id, entry.original.clone());
+        let mesh = |((a, old), (b, new)): (&(MeshId, Mesh), &(MeshId, Mesh))| {
+            let parts = |mesh: &Mesh| -> Vec<_> {
+                mesh.primitives.iter().map(|p| (p.first_index, p.index_count, p.material)).collect()
+            };
+            a == b && old.name == new.name && parts(old) == parts(new) && old.data == new.data
+        };
+        self.meshes.len() == now.meshes.len()
+            && self.meshes.iter().zip(&now.meshes).all(mesh)
+            && self.materials.iter().map(original).eq(now.materials.iter().map(original))
+            && self.textures == now.textures
+    }
+
     /// Materials that were edited stay as they were edited, primitives that were moved stay moved, of another file where the
     /// mesh has as many.
     pub(crate) fn keep_edits<'a>(
@@ -171,6 +186,19 @@ impl Document {
         let id = NodeId(self.allocate_id());
         let edit = Edit::AddNode { parent, index: usize::MAX, subtree: Subtree::single(id, node) };
         (id, edit)
+    }
+
+    /// The prefabs of the file that was read, each with whether it is what the file says now, edits aside.
+    pub fn prefabs_of(&mut self, imported: &Imported) -> Vec<(PrefabId, bool)> {
+        let source = &imported.prefab.source;
+        let known = self.prefabs().filter(|(_, prefab)| prefab.source == *source && !prefab.missing);
+        let known: Vec<(PrefabId, Prefab)> = known.map(|(id, prefab)| (id, prefab.clone())).collect();
+        let is_same = |(id, old): (PrefabId, Prefab)| {
+            let mut now = package_with_ids(self, id, imported.clone(), Some(&old));
+            now.prefab.name.clone_from(&old.name);
+            (id, now.prefab == old && self.package_of(id).is_some_and(|old| old.has_source_of(&now)))
+        };
+        known.into_iter().map(is_same).collect()
     }
 
     /// The edit that puts a new reading of the source in a prefab's place. Assets keep their ids by their

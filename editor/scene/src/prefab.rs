@@ -130,10 +130,11 @@ pub struct Prefab {
     scenes: Vec<SourceScene>,
     default_scene: usize,
     nodes: Vec<PartNode>,
-    subtree_end: Vec<u32>,
-    segments: Vec<String>,
+    // The same for all prefabs of a file.
+    subtree_end: Arc<[u32]>,
+    segments: Arc<[String]>,
     /// Parts in order of parent and segment.
-    by_segment: Vec<u32>,
+    by_segment: Arc<[u32]>,
     skins: Vec<Skin>,
     /// Which skins a part is a joint of.
     skins_of_joint: BTreeMap<u32, Vec<u32>>,
@@ -170,12 +171,12 @@ impl Prefab {
     /// # Errors
     /// When the list is not in depth-first order.
     pub fn set_nodes(&mut self, nodes: Vec<PartNode>) -> Result<(), PartOrderError> {
-        self.subtree_end = subtree_ends(&nodes)?;
-        self.segments = path_segments(&nodes);
+        self.subtree_end = subtree_ends(&nodes)?.into();
+        self.segments = path_segments(&nodes).into();
         self.nodes = nodes;
         let mut by_segment: Vec<u32> = (0..self.nodes.len() as u32).collect();
         by_segment.sort_unstable_by(|a, b| self.parent_and_segment(*a).cmp(&self.parent_and_segment(*b)));
-        self.by_segment = by_segment;
+        self.by_segment = by_segment.into();
         self.index_skins();
         Ok(())
     }

@@ -9,7 +9,7 @@ use super::editor::{Editor, Then};
 use crate::dialogs::{
     ENVIRONMENT_ENDINGS, EXPORT_ENDINGS, MODEL_ENDINGS, PROJECT_ENDING, SHAPE_ENDINGS, Wish,
 };
-use crate::session::{self, Loaded};
+use crate::session::{self, Arrived, Loaded};
 use crate::worker::{Answer, Job, Progress};
 
 /// What a file is read for.
@@ -179,7 +179,7 @@ impl Editor {
         let warnings = warning_count(&loaded);
         let was_empty = self.session.document().node_count() == 0;
         let left_out = matches!(&loaded, Loaded::Project(project) if !project.outside.is_empty());
-        let node = self.session.import(path, loaded)?;
+        let Arrived { node, changed } = self.session.import(path, loaded)?;
         self.session.end_gesture();
         if left_out {
             self.session.scene_mut().note_refused();
@@ -196,6 +196,13 @@ impl Editor {
             self.measure_scene();
         }
         self.tell(format!("Imported {}", short(path)), warnings);
+        if changed {
+            self.state.toasts.warning(format!(
+                "{} has changed since it was imported before: instances from then stay as they are until their source is \
+                 reloaded.",
+                short(path)
+            ));
+        }
         Ok(())
     }
 

@@ -102,12 +102,23 @@ pub(super) fn noted_view(meta: &ProjectMeta) -> (Option<ViewCamera>, Option<View
     (camera, settings)
 }
 
+/// What an import brought.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrived {
+    /// The new node; `None` for an environment.
+    pub node: Option<NodeId>,
+    /// The file has changed since the scene got it the first time: it has both readings now.
+    pub changed: bool,
+}
+
 /// An edit that brings something in, and the node that it makes.
 pub(super) struct Brought {
     pub(super) edit: Edit,
     pub(super) node: Option<NodeId>,
     /// What the project keeps that it comes from.
     pub(super) kept: ProjectMeta,
+    /// The document has an older reading of the file, which stays as it is.
+    pub(super) changed: bool,
 }
 
 /// Makes the edit that brings a project, a model or an environment into a document.
@@ -119,35 +130,47 @@ pub(super) fn import(document: &mut Document, path: &Path, loaded: Loaded) -> an
             let copies = document.merge_edit(&project.document, name)?;
             let mut kept = ProjectMeta::default();
             kept.keep_of(&project.meta, |id| copies.id_of(id));
-            Ok(Brought { edit: copies.edit, node: Some(copies.node), kept })
+            Ok(Brought { edit: copies.edit, node: Some(copies.node), kept, changed: false })
         }
-        Loaded::Model(imported) => {
-            let name = imported.prefab.name.clone();
-            let (prefab, add) = document.import_edit(*imported);
-            let (node, mut place) = document.instantiate_edit(prefab, None, Local::default());
-            // The prefab is not in the document yet, so that its name is not known there.
-            if let Edit::AddNode { subtree, .. } = &mut place
-                && let Some((_, top)) = subtree.nodes.first_mut()
-            {
-                top.name.clone_from(&name);
-            }
-            let edit = Edit::batch(format!("imported {name}"), vec![add, place]);
-            Ok(Brought { edit, node: Some(node), kept: ProjectMeta::default() })
-        }
+        Loaded::Model(imported) => Ok(model(document, *imported)),
         Loaded::Shapes(file) => {
             let name =
                 file.path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
             let source = ShapeSource::File(ShapeFile { path: absolute(&file.path), ..file });
             let (node, edit) = shapes_edit(document, &name, source, Local::default())?;
-            Ok(Brought { edit, node: Some(node), kept: ProjectMeta::default() })
+            Ok(Brought { edit, node: Some(node), kept: ProjectMeta::default(), changed: false })
         }
         Loaded::Environment(path, map) => {
             let path = absolute(&path);
             let file = EnvironmentFile { path, rotation_rad: 0.0, scale: 1.0, map: Some(map) };
             let edit = Edit::SetEnvironment(Environment::File(file));
-            Ok(Brought { edit, node: None, kept: ProjectMeta::default() })
+            Ok(Brought { edit, node: None, kept: ProjectMeta::default(), changed: false })
         }
     }
+}
+
+/// An instance of a model: of the prefab that the document has of it, unless the file is another now.
+fn model(document: &mut Document, imported: Imported) -> Brought {
+    let name = imported.prefab.name.clone();
+    let known = document.prefabs_of(&imported);
+    let same = known.iter().find_map(|&(prefab, is_same)| is_same.then_some(prefab));
+    let changed = same.is_none() && !known.is_empty();
+    let (prefab, add) = match same {
+        Some(prefab) => (prefab, None),
+        None => {
+            let (prefab, add) = document.import_edit(imported);
+            (prefab, Some(add))
+        }
+    };
+    let (node, mut place) = document.instantiate_edit(prefab, None, Local::default());
+    // A new prefab is not in the document yet, so that its name is not known there.
+    if let Edit::AddNode { subtree, .. } = &mut place
+        && let Some((_, top)) = subtree.nodes.first_mut()
+    {
+        top.name.clone_from(&name);
+    }
+    let edit = Edit::batch(format!("imported {name}"), add.into_iter().chain([place]).collect());
+    Brought { edit, node: Some(node), kept: ProjectMeta::default(), changed }
 }
 
 /// The edit that adds spheres and boxes in two plain colours, blue and orange, and the new node's id.
@@ -201,4 +224,45 @@ pub fn environment_argument(text: &str) -> anyhow::Result<Environment> {
     })?;
     let map = Some(Arc::new(map));
     Ok(Environment::File(EnvironmentFile { path: path.to_owned(), rotation_rad: 0.0, scale: 1.0, map }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle in a material of this name.
+    fn write(path: &Path, material: &str) -> std::io::Result<()> {
+        let buffer = "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+        let file = serde_json::json!({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "materials": [{"name": material}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": buffer}]});
+        std::fs::write(path, file.to_string())
+    }
+
+    #[test]
+    fn a_file_that_the_scene_has_is_placed_again_and_one_that_changed_comes_beside_it() -> anyhow::Result<()>
+    {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("a.gltf");
+        let mut document = Document::new();
+        let mut undo = Vec::new();
+        let mut seen = Vec::new();
+        for material in ["red", "red", "blue", "blue"] {
+            write(&path, material)?;
+            let brought = import(&mut document, &path, load(&path, false, &|_, _| {})?)?;
+            undo.push(document.apply(brought.edit)?);
+            let name = brought.node.and_then(|node| document.node(node)).map(|node| node.name.as_str());
+            assert_eq!(name, Some("a"));
+            seen.push((document.prefabs().count(), document.meshes().count(), brought.changed));
+        }
+        assert_eq!(seen, [(1, 1, false), (1, 1, false), (2, 2, true), (2, 2, false)]);
+        let mut left = Vec::new();
+        for edit in undo.into_iter().rev() {
+            document.apply_back(edit)?;
+            left.push((document.node_count(), document.prefabs().count()));
+        }
+        assert_eq!(left, [(3, 2), (2, 1), (1, 1), (0, 0)]);
+        Ok(())
+    }
 }

@@ -1,7 +1,7 @@
 //! A project file to a document: bring it to this version, import the prefabs, lay the edits over them.
 //! In: a path. Out: [`Project`]. What is missing becomes a placeholder of the same ids, and a warning.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, Sha
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
 use crate::ids::{MaterialId, MeshId, NodeId, Target};
-use crate::import::{self, ImportOptions, Warning, short};
+use crate::import::{self, ImportError, ImportOptions, Imported, Warning, short};
 use crate::node::{Node, NodeKind, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage, package_with_ids};
 
@@ -79,6 +79,8 @@ pub(super) struct Loader<'a> {
     pub warnings: Vec<Warning>,
     outside: Vec<PathBuf>,
     own_paths: bool,
+    /// Sources that several prefabs have, as they were read.
+    shared: HashMap<PathBuf, Option<Result<Imported, ImportError>>>,
 }
 
 /// Beyond it a file leaves no room for ids that the document gives out.
@@ -106,15 +108,18 @@ impl<'a> Loader<'a> {
             warnings: Vec::new(),
             outside: Vec::new(),
             own_paths,
+            shared: HashMap::new(),
         };
         loader.meta.kept.unknown = unknown;
         // Before anything new gets an id, so that none in the file is taken.
         loader.document.reserve_ids_up_to(last_id);
+        loader.shared = shared_sources(path, &record.prefabs);
         let count = record.prefabs.len().max(1) as f32;
         for (index, prefab) in record.prefabs.into_iter().enumerate() {
             progress(&prefab.name, index as f32 / count);
             loader.add_prefab(prefab)?;
         }
+        loader.shared.clear();
         for material in record.materials {
             loader.add_material(material)?;
         }
@@ -141,6 +146,20 @@ impl<'a> Loader<'a> {
         let Self { document, meta, warnings, outside, .. } = self;
         Project { document, meta, warnings: import::summed(warnings), outside, file }
     }
+}
+
+/// The sources that more than one prefab has.
+fn shared_sources(
+    path: &Path,
+    prefabs: &[PrefabRecord],
+) -> HashMap<PathBuf, Option<Result<Imported, ImportError>>> {
+    let source = |prefab: &PrefabRecord| match resolve(path, &prefab.source) {
+        Ok(source) | Err(Refusal::Outside(source)) => Some(source),
+        Err(Refusal::Never(_)) => None,
+    };
+    let mut seen = HashSet::new();
+    let again = prefabs.iter().filter_map(source).filter(|source| !seen.insert(source.clone()));
+    again.map(|source| (source, None)).collect()
 }
 
 impl Loader<'_> {
@@ -194,15 +213,29 @@ impl Loader<'_> {
     /// Imports the source of a placeholder, which stays in its place when the source cannot be read.
     pub fn import(&mut self, placeholder: PrefabPackage) -> PrefabPackage {
         let PrefabPackage { id, prefab, .. } = &placeholder;
-        match import::load(&prefab.source, &self.options) {
-            Ok(mut imported) => {
-                self.warnings.append(&mut imported.warnings);
+        match self.read_source(&prefab.source) {
+            Ok(imported) => {
                 let mut package = package_with_ids(&mut self.document, *id, imported, Some(prefab));
                 package.prefab.name.clone_from(&prefab.name);
                 package
             }
             Err(error) => self.without_source(placeholder, error.to_string()),
         }
+    }
+
+    /// A source that several prefabs have is read once, and what is wrong with it said once.
+    fn read_source(&mut self, source: &Path) -> Result<Imported, ImportError> {
+        if let Some(Some(known)) = self.shared.get(source) {
+            return known.clone();
+        }
+        let mut read = import::load(source, &self.options);
+        if let Ok(imported) = &mut read {
+            self.warnings.append(&mut imported.warnings);
+        }
+        if let Some(shared) = self.shared.get_mut(source) {
+            *shared = Some(read.clone());
+        }
+        read
     }
 
     fn without_source(&mut self, placeholder: PrefabPackage, reason: String) -> PrefabPackage {

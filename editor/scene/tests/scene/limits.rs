@@ -1,6 +1,7 @@
-//! What is there in great numbers: nodes of a document, warnings of one kind, depth of `extras`.
+//! What is there in great numbers: nodes of a document, prefabs of one source, warnings of one kind, depth of `extras`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use caustica_scene::import::{ImportOptions, load};
 use caustica_scene::{
@@ -77,6 +78,42 @@ fn a_project_of_more_nodes_than_a_document_has_is_refused_in_words() {
     std::fs::write(&path, project.to_string()).unwrap();
     let error = Project::load(&path).unwrap_err().to_string();
     assert!(error.contains("p.caustica.json") && error.contains("20021001 nodes"), "{error}");
+}
+
+#[test]
+fn prefabs_of_one_source_share_what_was_read_and_warn_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = write(folder.path(), 1, json!({"extensionsUsed": ["X_none"]}));
+    let mut document = Document::new();
+    for _ in 0..3 {
+        document.add_imported(load(&source, &ImportOptions::default()).unwrap()).unwrap();
+    }
+    let path = folder.path().join("p.caustica.json");
+    Project::save(&path, &document, &ProjectMeta::default()).unwrap();
+    let project = Project::load(&path).unwrap();
+    assert!(project.document == document);
+    let meshes: Vec<_> = project.document.meshes().map(|(_, mesh)| &mesh.data).collect();
+    assert!(meshes.len() == 3 && meshes.iter().all(|data| Arc::ptr_eq(data, meshes[0])));
+    assert_eq!(project.warnings.len(), 1, "{:?}", project.warnings);
+}
+
+#[test]
+fn a_file_is_known_again_until_it_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |members: Value| load(&write(folder.path(), 2, members), &ImportOptions::default()).unwrap();
+    let mut document = Document::new();
+    let prefab = document.add_imported(read(json!({}))).unwrap();
+    let (material, value) = document.materials().next().map(|(id, value)| (id, value.clone())).unwrap();
+    let value = Box::new(caustica_scene::Material { roughness: 0.25, ..value });
+    document.apply(Edit::SetMaterial { material, value }).unwrap();
+    let before = document.clone();
+    assert_eq!(
+        document.prefabs_of(&read(json!({}))),
+        [(prefab, true)],
+        "an edit of the scene is none of the file"
+    );
+    assert_eq!(document.prefabs_of(&read(json!({"materials": [{}]}))), [(prefab, false)]);
+    assert!(document == before);
 }
 
 #[test]

@@ -146,7 +146,8 @@ fn a_model_is_exported_and_checked_as_the_same() {
     for (output, code, reason) in [
         ("out.obj", 2, ".glb or .gltf"),
         ("moves.gltf", 1, "is a source"),
-        ("absent/a.glb", 1, "cannot be written"),
+        ("new/folder/a.glb", 0, ""),
+        ("out.bin/a.glb", 1, "out.bin: File exists"),
     ] {
         let run = caustica(folder.path(), &["export", "moves.gltf", "-o", output]);
         assert!(run.code == Some(code) && run.stderr.contains(reason), "{:?} {}", run.code, run.stderr);
@@ -391,6 +392,10 @@ fn wrong_usage_ends_with_2() {
         let run = caustica(folder.path(), &arguments);
         assert_eq!(run.code, Some(2), "{arguments:?}: {}", run.stderr);
         assert!(run.stdout.is_empty());
+    }
+    for (size, words) in [("160x", "expected WIDTHxHEIGHT"), ("1.5x2", "'1.5' is no number of pixels")] {
+        let run = caustica(folder.path(), &["render", &gallery, "-o", "a.png", "--size", size]);
+        assert!(run.code == Some(2) && run.stderr.contains(words), "{}", run.stderr);
     }
     let nothing = caustica(folder.path(), &["--memory-budget", "0", "devices"]).stderr;
     let first = nothing.lines().next().unwrap_or_default();

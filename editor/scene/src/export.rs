@@ -308,10 +308,16 @@ impl<'a> Writer<'a> {
         for key in keys {
             let Some(mesh) = meshes.get(key.mesh) else { continue };
             let (buffer, used) = (&mut self.buffer, &mut self.used);
-            let mut writer = MeshWriter { document: self.document, buffer, materials, sources, used };
+            let document = self.document;
+            let mut writer = MeshWriter { document, buffer, materials, sources, used, colors_held: false };
             let (mut object, extras) = writer.write(key, mesh);
+            let colors_held = writer.colors_held;
             sources.put(&mut object, sources.mesh(key.mesh), extras, &mut self.used);
             list.push(Value::Object(object));
+            if colors_held {
+                let reason = "colours of its vertices are held to 0 to 1, as glTF wants it";
+                self.warn(&format!("mesh \"{}\"", short(&mesh.name)), reason);
+            }
         }
         list
     }

@@ -24,7 +24,7 @@ mod watched;
 
 pub use environment::load_environment;
 pub use error::{ImportError, Warning, counted};
-pub(crate) use error::{UTF16, is_utf16, plain, short, summed};
+pub(crate) use error::{UTF16, is_utf16, plain, refuse_lfs_pointer, short, summed};
 pub use shapes::load_shapes;
 pub(crate) use uri::{Location, is_address, leads_out, resolve};
 
@@ -110,7 +110,9 @@ fn require_regular_file(path: &Path) -> Result<(), ImportError> {
 
 fn read_model_file(path: &Path) -> Result<Vec<u8>, ImportError> {
     require_regular_file(path)?;
-    std::fs::read(path).map_err(|error| ImportError::new(path, format!("cannot be read: {error}")))
+    let bytes =
+        std::fs::read(path).map_err(|error| ImportError::new(path, format!("cannot be read: {error}")))?;
+    refuse_lfs_pointer(&bytes).map_or(Ok(bytes), |reason| Err(ImportError::new(path, reason)))
 }
 
 /// A texture that stands in for one that is missing.

@@ -8,7 +8,7 @@ use caustica_scene::{ExportFormat, export};
 use clap::Args;
 use serde_json::json;
 
-use super::{SourceArgs, document_of};
+use super::{SourceArgs, document_of, output};
 
 /// Arguments of `caustica export`.
 #[derive(Args, Debug)]
@@ -28,6 +28,7 @@ pub(super) struct ExportArgs {
 /// Writes the scene.
 pub(super) fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
     let (document, import_warnings) = document_of(&args.file, args.sources)?;
+    output::make_folder(&args.output)?;
     let exported = export(&document, &args.output)?;
     exported.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
     let (nodes, meshes, materials) = (exported.nodes, exported.meshes, exported.materials);

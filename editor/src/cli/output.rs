@@ -87,7 +87,11 @@ pub(super) fn write_exr(
     exr_file::write(path, extent, exr_file::channels_of(["R", "G", "B"], radiance).collect(), notes)
 }
 
-fn make_folder(path: &Path) -> anyhow::Result<()> {
+/// Makes the folder of a file where it is not there.
+///
+/// # Errors
+/// When it cannot be made.
+pub(super) fn make_folder(path: &Path) -> anyhow::Result<()> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         Some(folder) => std::fs::create_dir_all(folder).with_context(|| folder.display().to_string()),
         None => Ok(()),

@@ -121,8 +121,12 @@ fn choose_variant(session: &mut Session, name: &str) -> anyhow::Result<()> {
 }
 
 pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
-    let side = |text: &str| text.trim().parse::<u32>().map_err(|error| format!("'{text}': {error}"));
+    let expected = "expected WIDTHxHEIGHT in whole pixels, such as 1280x720";
+    let (width, height) = text.split_once(['x', 'X']).ok_or(expected)?;
+    let side = |text: &str| match text.trim() {
+        "" => Err(expected.to_owned()),
+        text => text.parse::<u32>().map_err(|_| format!("'{text}' is no number of pixels; {expected}")),
+    };
     match [side(width)?, side(height)?] {
         [0, _] | [_, 0] => Err(String::from("a side of 0 pixels")),
         size => Ok(size),

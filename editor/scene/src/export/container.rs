@@ -104,12 +104,14 @@ fn replace(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
     atomic::write(path, bytes).map_err(|error| ExportError::new(path, format!("cannot be written: {error}")))
 }
 
-/// The file name with everything encoded that a URI must not hold (RFC 3986, section 2.3).
+/// The file name with everything encoded that a URI must not hold (RFC 3986, section 2.3). A name with a colon would read as an address
+/// or a drive once it is decoded, and so begins with the folder that it is in (section 4.2).
 fn uri_of(path: &Path) -> String {
     const ENCODED: &percent_encoding::AsciiSet =
         &percent_encoding::NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    percent_encoding::utf8_percent_encode(&name, ENCODED).to_string()
+    let here = if name.contains(':') { "./" } else { "" };
+    format!("{here}{}", percent_encoding::utf8_percent_encode(&name, ENCODED))
 }
 
 fn binary(json: &Value, bytes: &[u8]) -> Result<Vec<u8>, String> {

@@ -100,6 +100,14 @@ fn vertex_sets(mesh: &Mesh) -> Vec<VertexSet> {
     sets
 }
 
+/// Colours of points and lines within 0 and 1; `None` where they are so already.
+fn held(numbers: &Numbers) -> Option<Numbers> {
+    let values = numbers.bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
+    let bytes: Vec<u8> = values.flat_map(|value| value.clamp(0.0, 1.0).to_le_bytes()).collect();
+    (numbers.component == 5126 && *bytes != *numbers.bytes)
+        .then(|| Numbers { bytes: bytes.into(), ..numbers.clone() })
+}
+
 /// Writes meshes.
 pub(super) struct MeshWriter<'a> {
     pub document: &'a Document,
@@ -108,6 +116,8 @@ pub(super) struct MeshWriter<'a> {
     pub materials: &'a BTreeMap<MaterialId, usize>,
     pub sources: &'a Sources<'a>,
     pub used: &'a mut Extensions,
+    /// Some colours of vertices were not within 0 and 1.
+    pub colors_held: bool,
 }
 
 impl MeshWriter<'_> {
@@ -178,6 +188,9 @@ impl MeshWriter<'_> {
         let mut attributes = |list: &[(String, Numbers)]| {
             let mut object = Object::new();
             for (name, numbers) in list {
+                let held = name.starts_with("COLOR_").then(|| held(numbers)).flatten();
+                self.colors_held |= held.is_some();
+                let numbers = held.as_ref().unwrap_or(numbers);
                 object.put(name, self.buffer.numbers(numbers, name == "POSITION", usage));
             }
             object
@@ -231,7 +244,9 @@ impl MeshWriter<'_> {
             }
         }
         if let Some(colors) = cut.needed(&data.colors, Vec4::ONE) {
-            let values: Vec<[f32; 4]> = colors.iter().map(|color| color.to_array()).collect();
+            let held = |color: &Vec4| color.clamp(Vec4::ZERO, Vec4::ONE);
+            self.colors_held |= colors.iter().any(|color| held(color) != *color);
+            let values: Vec<[f32; 4]> = colors.iter().map(|color| held(color).to_array()).collect();
             attributes.put("COLOR_0", self.buffer.floats(&values, false, usage));
         }
         if let Some(skin) = &data.skin

@@ -67,7 +67,13 @@ impl<'a> Textures<'a> {
         sources.put(&mut image, kept.map(|(prefab, kept)| (prefab, &kept.image)), Object::new(), used);
         match self.image(texture, image) {
             Some(image) => object.put("source", image),
-            None => self.missing.push(texture.name.clone()),
+            None => {
+                self.missing.push(texture.name.clone());
+                // There is no image to have the name.
+                if !object.contains_key("name") {
+                    object.put_text("name", &texture.name);
+                }
+            }
         }
         sources.put(&mut object, kept.map(|(prefab, kept)| (prefab, &kept.unknown)), Object::new(), used);
         Some(self.textures.place(object))

@@ -67,7 +67,7 @@ pub(super) fn decode(bytes: &[u8], max_extent_px: u32) -> Result<Pixels, String>
         Encoding::Uastc => uastc::decode(level, canvas),
         Encoding::UastcZstandard => uastc::decode(&inflate(level, &canvas)?, canvas),
     }?;
-    Ok(Pixels { width, height, rgba8: rgba8.into(), placeholder: false, encoded: None })
+    Ok(Pixels { width, height, rgba8: rgba8.into(), placeholder: false, of_print: false, encoded: None })
 }
 
 /// Zstandard, into exactly the bytes that the blocks of the image have.

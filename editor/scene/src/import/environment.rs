@@ -26,7 +26,8 @@ pub fn load_environment(path: &Path) -> Result<(RadianceMap, Vec<Warning>), Impo
 /// The same of bytes that lie in a file.
 pub(super) fn of_bytes(bytes: &[u8], path: &Path) -> Result<(RadianceMap, Vec<Warning>), ImportError> {
     let at = Cell::new(0);
-    let image = decode(bytes, &at)
+    let head = with_plain_head(bytes);
+    let image = decode(head.as_deref().unwrap_or(bytes), &at)
         .map_err(|reason| ImportError::new(path, reason).at(format!("byte {}", at.get())))?;
     let (width, height) = image.dimensions();
     let mut repaired = 0_usize;
@@ -59,6 +60,26 @@ pub(super) fn of_bytes(bytes: &[u8], path: &Path) -> Result<(RadianceMap, Vec<Wa
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let map = RadianceMap { name, width, height, rgb };
     Ok((map, warnings))
+}
+
+/// The bytes of a Radiance file whose head has the line ends of Windows, which the decoder takes for a part of what they end, with
+/// plain ones: up to the line of the size, which follows an empty one. `None` for other files.
+fn with_plain_head(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut plain: Vec<u8> = Vec::new();
+    let (mut rest, mut ended) = (bytes.strip_prefix(b"#?").filter(|_| bytes.contains(&b'\r'))?, false);
+    plain.extend(b"#?");
+    loop {
+        let (line, after) = rest.split_at(rest.iter().position(|byte| *byte == b'\n')? + 1);
+        let content = line.strip_suffix(b"\r\n").or(line.strip_suffix(b"\n"))?;
+        plain.extend(content);
+        plain.push(b'\n');
+        rest = after;
+        if ended {
+            plain.extend(rest);
+            return Some(plain);
+        }
+        ended = content.is_empty();
+    }
 }
 
 /// Decodes a map; `at` is how far it was read.

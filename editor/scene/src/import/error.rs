@@ -56,6 +56,12 @@ pub(crate) fn is_utf16(bytes: &[u8]) -> bool {
     is_marked || (zero(&even) && letters(&odd)) || (letters(&even) && zero(&odd))
 }
 
+/// Why a file that Git LFS has not fetched is not read; `None`: it is none.
+pub(crate) fn refuse_lfs_pointer(bytes: &[u8]) -> Option<&'static str> {
+    let is_pointer = bytes.starts_with(b"version https://git-lfs.github.com/spec/");
+    is_pointer.then_some("is a Git LFS pointer and not the file itself; run `git lfs pull`")
+}
+
 /// Why a file cannot be imported.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImportError {

@@ -19,6 +19,8 @@ pub(super) struct Pixels {
     pub height: u32,
     pub rgba8: Arc<[u8]>,
     pub placeholder: bool,
+    /// The file has the four channels of print (CMYK), which glTF does not know.
+    pub of_print: bool,
     /// The PNG or JPEG that they were read from.
     pub encoded: Option<Arc<[u8]>>,
 }
@@ -30,9 +32,11 @@ pub(super) fn decode(bytes: Vec<u8>, max_extent_px: u32) -> Result<Pixels, Strin
     }
     let mut reader =
         ImageReader::new(Cursor::new(&bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+    let of_print = reader.format() == Some(ImageFormat::Jpeg) && jpeg_channels(&bytes) == Some(4);
     // What every program reads is kept as it is for exports.
     let is_plain = match reader.format() {
-        Some(ImageFormat::Png | ImageFormat::Jpeg) => true,
+        Some(ImageFormat::Png) => true,
+        Some(ImageFormat::Jpeg) => !of_print,
         Some(ImageFormat::WebP) => false,
         Some(other) => return Err(format!("{other:?} images are not supported here")),
         None => return Err("it is neither PNG, JPEG, WebP nor KTX 2".to_owned()),
@@ -55,7 +59,21 @@ pub(super) fn decode(bytes: Vec<u8>, max_extent_px: u32) -> Result<Pixels, Strin
         return Err("it has no texels".to_owned());
     }
     let encoded = is_plain.then(|| bytes.into());
-    Ok(Pixels { width, height, rgba8: image.into_raw().into(), placeholder: false, encoded })
+    Ok(Pixels { width, height, rgba8: image.into_raw().into(), placeholder: false, of_print, encoded })
+}
+
+/// How many channels a JPEG has (ITU-T T.81, annex B).
+fn jpeg_channels(bytes: &[u8]) -> Option<u8> {
+    let mut at = 2;
+    loop {
+        let marker = *bytes.get(at + 1).filter(|_| bytes.get(at) == Some(&0xff))?;
+        match marker {
+            0xff => at += 1,
+            // Frame headers, among tables whose numbers lie between theirs.
+            0xc0..=0xcf if !matches!(marker, 0xc4 | 0xc8 | 0xcc) => return bytes.get(at + 9).copied(),
+            _ => at += 2 + usize::from(u16::from_be_bytes([*bytes.get(at + 2)?, *bytes.get(at + 3)?])),
+        }
+    }
 }
 
 /// A checker in magenta and black, seen at once.
@@ -69,6 +87,7 @@ pub(super) fn placeholder() -> Pixels {
         height: CHECKER_PX,
         rgba8: (0..CHECKER_PX * CHECKER_PX).flat_map(texel).collect(),
         placeholder: true,
+        of_print: false,
         encoded: None,
     }
 }

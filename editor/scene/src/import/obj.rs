@@ -149,10 +149,11 @@ impl Libraries<'_> {
     /// What tobj wants to know: names with their places. The rest is kept here.
     fn open(&self, names: &Path) -> (Vec<tobj::Material>, HashMap<String, usize>) {
         let names = names.to_string_lossy();
+        let names = maps::unquoted(&names);
         let beside = |name: &str| uri::beside(name, self.folder);
-        let whole = beside(&names).is_ok_and(|file| file.is_file());
+        let whole = beside(names).is_ok_and(|file| file.is_file());
         // One name with blanks, or several names.
-        let list = if whole { vec![&*names] } else { names.split_whitespace().collect() };
+        let list = if whole { vec![names] } else { names.split_whitespace().collect() };
         let mut read = self.read.borrow_mut();
         let start = read.materials.len();
         for name in list {

@@ -35,11 +35,16 @@ fn parse(text: &str) -> Result<Vec<Shape>, (usize, String)> {
     let mut shapes = Vec::new();
     let mut begun = false;
     let mut head: Option<Head> = None;
-    // Tables of some programs begin with a byte order mark.
-    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+    // Tables of some programs begin with a byte order mark, or end their lines as old Macs did.
+    let text = text.trim_start_matches('\u{feff}');
+    let end = if text.contains('\n') { '\n' } else { '\r' };
+    for (index, line) in text.split(end).enumerate() {
         let content = line.split('#').next().unwrap_or_default();
+        // Where semicolons part the numbers, commas are what others write as points.
+        let content = content.replace(',', if content.contains(';') { "." } else { " " });
         let words: Vec<&str> = content
-            .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
+            .split(|c: char| c.is_whitespace() || c == ';')
+            .map(|word| word.trim_matches(['"', '\'']))
             .filter(|word| !word.is_empty())
             .collect();
         if words.is_empty() {
@@ -74,8 +79,7 @@ struct Head {
 
 impl Head {
     fn read(words: &[&str]) -> Result<Self, String> {
-        let bare = |word: &&str| word.trim_matches(['"', '\'']).to_ascii_lowercase();
-        let names: Vec<String> = words.iter().map(bare).collect();
+        let names: Vec<String> = words.iter().map(|word| word.to_ascii_lowercase()).collect();
         let names: Vec<&str> =
             names.iter().map(|name| if name == "radius" { "r" } else { name.as_str() }).collect();
         let expected = "columns are x, y, z and r (or radius) of spheres, x, y, z, hx, hy and hz of boxes";
@@ -133,12 +137,16 @@ mod tests {
     #[test]
     fn spheres_and_boxes_in_every_notation() {
         let text = "# made by hand\nx;y;z;r\n1 2 3 0.5\n\n-1,2e0,\t3, 4 # a large one\n0;0;0;1;2;3\r\n";
+        let of_comma_countries = "1;2,0;3;0,5\n-1,0;2;3;4\n0;0;0;1;2,0;3\n";
+        let of_old_macs = "x,y,z,r\r\"1\",\"2\",'3',\".5\"\r";
         let expected = [
             Shape::sphere(Vec3::new(1.0, 2.0, 3.0), 0.5),
             Shape::sphere(Vec3::new(-1.0, 2.0, 3.0), 4.0),
             Shape::cuboid(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)),
         ];
         assert_eq!(parse(text).unwrap(), expected);
+        assert_eq!(parse(of_comma_countries).unwrap(), expected);
+        assert_eq!(parse(of_old_macs).unwrap(), expected[..1]);
     }
 
     #[test]

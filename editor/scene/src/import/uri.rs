@@ -46,6 +46,16 @@ pub(super) fn below(name: &str, folder: &Path, root: &Path) -> Result<PathBuf, S
     if name.is_empty() || name.contains('\0') {
         return Err("the file name is empty or holds a zero byte".to_owned());
     }
+    // Where a backslash parts no names, it may be in one; else it is what other systems write for a slash.
+    let literal = folder.join(name);
+    if !cfg!(windows)
+        && name.contains('\\')
+        && !name.contains('/')
+        && literal.is_file()
+        && !leads_out(&literal, root)
+    {
+        return Ok(literal);
+    }
     let name = name.replace('\\', "/");
     let shown = short(&name);
     if name.len() > MOST_NAME_BYTES {

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use super::super::uri::{Location, resolve};
 use super::compressed;
 use super::json::{Fault, Item};
-use crate::import::require_regular_file;
 use crate::import::room::Room;
+use crate::import::{refuse_lfs_pointer, require_regular_file};
 
 /// Largest image file that is read, bytes.
 const MAX_IMAGE_FILE_BYTES: u64 = 1 << 30;
@@ -156,12 +156,19 @@ pub(in crate::import) fn read_image_uri(uri: &str, folder: &Path) -> Result<Vec<
     }
 }
 
+/// Longest beginning of a file that tells what it is, bytes.
+const HEAD_BYTES: u64 = 64;
+
 /// Reads at most `limit` bytes of a regular file.
 pub(in crate::import) fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, String> {
     require_regular_file(path).map_err(|error| error.to_string())?;
     let mut bytes = Vec::new();
     File::open(path)
-        .and_then(|file| file.take(limit).read_to_end(&mut bytes))
+        .and_then(|file| file.take(limit.max(HEAD_BYTES)).read_to_end(&mut bytes))
         .map_err(|error| format!("{}: {error}", path.display()))?;
+    if let Some(reason) = refuse_lfs_pointer(&bytes) {
+        return Err(format!("{} {reason}", path.display()));
+    }
+    bytes.truncate(usize::try_from(limit).unwrap_or(usize::MAX));
     Ok(bytes)
 }

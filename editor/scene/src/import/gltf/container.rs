@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::json::Fault;
 use crate::deep;
+use crate::import::{UTF16, is_utf16};
 
 const MAGIC: &[u8] = b"glTF";
 const CHUNK_JSON: u32 = 0x4E4F_534A;
@@ -81,6 +82,9 @@ fn parse(bytes: &[u8]) -> Result<Value, Fault> {
     if bytes.starts_with(b"\xEF\xBB\xBF") {
         let reason = "the JSON begins with a byte order mark, which glTF forbids; save it without one";
         return Err(Fault::new("line 1 column 1", reason));
+    }
+    if is_utf16(bytes) {
+        return Err(Fault::new("line 1 column 1", format!("it {UTF16}")));
     }
     let json: Value = deep::parse(bytes).map_err(|error| {
         let place = format!("line {} column {}", error.line(), error.column());

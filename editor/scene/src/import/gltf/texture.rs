@@ -140,7 +140,7 @@ impl TextureTable {
         folder: &Path,
         max_extent_px: u32,
     ) -> Result<(Vec<Texture>, Vec<Fault>), Fault> {
-        let images = root.objects("images")?;
+        let (images, items) = (root.objects("images")?, root.objects("textures")?);
         let decode_all = |wanted: Vec<usize>| -> BTreeMap<usize, Result<Pixels, String>> {
             let decode = |index: usize| {
                 let bytes = encoded(images.get(index)?, buffers, views, folder);
@@ -163,16 +163,22 @@ impl TextureTable {
         let replaced: BTreeSet<usize> =
             keys().filter(|key| key.fallback.and_then(read).is_some()).filter_map(|key| key.image).collect();
         for (index, pixels) in &decoded {
-            if let Err(reason) = pixels {
-                let instead = match replaced.contains(index) {
-                    true => "the image for programs that do not know its format is shown",
-                    false => "a checker stands in",
-                };
-                let text = format!("the image cannot be read ({reason}); {instead}");
-                warnings.push(Fault::new(format!("/images/{index}"), text));
-            }
+            let text = match pixels {
+                Err(reason) => {
+                    let instead = match replaced.contains(index) {
+                        true => "the image for programs that do not know its format is shown",
+                        false => "a checker stands in",
+                    };
+                    format!("the image cannot be read ({reason}); {instead}")
+                }
+                Ok(pixels) if pixels.of_print => {
+                    "the image has the colours of print (CMYK), which glTF does not know; exports write it as PNG".to_owned()
+                }
+                Ok(_) => continue,
+            };
+            warnings.push(Fault::new(format!("/images/{index}"), text));
         }
-        for (key, place) in &self.wanted {
+        for ((key, place), first) in self.wanted.iter().zip(&self.first) {
             if key.image.is_none() {
                 let reason = "the texture has no image that can be read; a checker stands in";
                 warnings.push(Fault::new(place, reason));
@@ -181,7 +187,10 @@ impl TextureTable {
             let pixels = shown.map_or(&stand_in, |(_, pixels)| pixels);
             let item = shown.map(|(index, _)| index).or(key.image).and_then(|index| images.get(index));
             textures.push(Texture {
-                name: image_name(item)?,
+                name: item
+                    .map(image_name)
+                    .or(items.get(*first).map(Item::name))
+                    .unwrap_or_else(|| Ok(String::new()))?,
                 width: pixels.width,
                 height: pixels.height,
                 rgba8: pixels.rgba8.clone(),
@@ -195,10 +204,7 @@ impl TextureTable {
     }
 }
 
-fn image_name(image: Option<&Item<'_>>) -> Result<String, Fault> {
-    let Some(image) = image else {
-        return Ok(String::new());
-    };
+fn image_name(image: &Item<'_>) -> Result<String, Fault> {
     let name = image.name()?;
     let uri = image.text("uri")?.filter(|uri| !uri.starts_with("data:"));
     Ok(match (name.is_empty(), uri) {

@@ -224,8 +224,9 @@ impl Map {
                 other => return Err(format!("\"{}\" is no option of a map", short(other))),
             }
         }
-        rest.clone_into(&mut map.file);
-        match rest.is_empty() {
+        let name = unquoted(rest);
+        name.clone_into(&mut map.file);
+        match name.is_empty() {
             true => Err("there is no file name".to_owned()),
             false => Ok((map, ignored)),
         }
@@ -245,6 +246,11 @@ impl Map {
     pub fn lies_like(&self, other: &Self) -> bool {
         (self.scale, self.offset, self.clamp) == (other.scale, other.offset, other.clamp)
     }
+}
+
+/// A name without the quotes that some programs put around those with spaces.
+pub(super) fn unquoted(name: &str) -> &str {
+    name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).unwrap_or(name).trim()
 }
 
 /// Takes a word off the front.

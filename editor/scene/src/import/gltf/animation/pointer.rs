@@ -123,8 +123,9 @@ impl Reader<'_> {
     }
 }
 
-/// The number behind a prefix, and what follows it.
+/// The number behind a prefix, and what follows it. A number has no sign and no zeros before it (RFC 6901, section 4).
 fn split<'a>(pointer: &'a str, prefix: &str) -> Option<(usize, &'a str)> {
     let (number, rest) = pointer.strip_prefix(prefix)?.split_once('/')?;
-    Some((number.parse().ok()?, rest))
+    let place = number.parse::<usize>().ok()?;
+    (place.to_string() == number).then_some((place, rest))
 }

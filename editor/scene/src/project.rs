@@ -15,6 +15,7 @@ use crate::ids::{MaterialId, MeshId, TextureId};
 use crate::import::{ImportOptions, Warning, plain};
 
 pub(crate) mod atomic;
+mod fault;
 mod journal;
 mod migrate;
 mod paths;
@@ -149,7 +150,7 @@ pub enum ProjectProblem {
     /// The file system said no.
     #[error("{0}")]
     Io(#[from] std::io::Error),
-    /// Not JSON, or a field has the wrong type.
+    /// Not JSON.
     #[error("not a valid project: {0}")]
     Json(#[from] serde_json::Error),
     /// There is no version in it.

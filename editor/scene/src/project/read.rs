@@ -8,13 +8,14 @@ use std::sync::Arc;
 use glam::DAffine3;
 use serde_json::Value;
 
+use super::fault::element;
 use super::paths::{Refusal, from_relative, is_foreign, resolve};
 use super::record::{
-    CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, PrefabRecord, ProjectRecord,
-    ShapeMeshRecord, ShapesRecord, missing_mesh, placeholder,
+    CameraRecord, EnvironmentRecord, MaterialRecord, MeshRecord, NodeRecord, PrefabRecord, ShapeMeshRecord,
+    ShapesRecord, missing_mesh, placeholder,
 };
 use super::unknown::ProjectFile;
-use super::{Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, migrate, sound};
+use super::{Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, fault, migrate, sound};
 use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, ShapeSource};
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
@@ -39,7 +40,11 @@ pub(super) fn load(
 /// Refuses folders, devices and pipes: reading them could go on for ever.
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ProjectProblem> {
     match std::fs::metadata(path)?.is_file() {
-        true => Ok(std::fs::read(path)?),
+        true => {
+            let bytes = std::fs::read(path)?;
+            let pointer = import::refuse_lfs_pointer(&bytes);
+            pointer.map_or(Ok(bytes), |reason| Err(ProjectProblem::Broken(reason.to_owned())))
+        }
         false => Err(ProjectProblem::Broken("is not a file".to_owned())),
     }
 }
@@ -60,14 +65,15 @@ pub(super) fn parse(bytes: &[u8]) -> Result<ProjectFile, ProjectProblem> {
     if found > SCHEMA_VERSION {
         return Err(ProjectProblem::Newer { found });
     }
-    if found == SCHEMA_VERSION {
-        // From the text again, because errors then name a line.
-        return Ok(ProjectFile::new(serde_json::from_slice(bytes)?, &value)?);
+    if found < SCHEMA_VERSION {
+        let value = migrate::to_newest(found, value);
+        return serde_json::from_value(value.clone()).map_err(|error| fault::of_field(&value, bytes, error));
     }
-    serde_json::from_value(migrate::to_newest(found, value)).map_err(|error| {
-        // Where the old text has the same fault, the line in it.
-        serde_json::from_slice::<ProjectRecord>(bytes).map_or_else(Into::into, |_| error.into())
-    })
+    // From the text again, so that errors name a line too.
+    match serde_json::from_slice(bytes) {
+        Ok(record) => Ok(ProjectFile::new(record, &value)?),
+        Err(error) => Err(fault::of_field(&value, bytes, error)),
+    }
 }
 
 /// A document that comes into being, from a project and from what a journal adds to it.
@@ -96,9 +102,9 @@ impl<'a> Loader<'a> {
         progress: &dyn Fn(&str, f32),
     ) -> Result<Self, ProjectProblem> {
         let ProjectFile { record, unknown } = file;
-        let last_id = record.next_id.saturating_sub(1).max(record.largest_id());
+        let (last_id, place) = record.largest_id();
         if last_id > MOST_ID {
-            return Err(ProjectProblem::Broken(format!("id {last_id} leaves no room for others")));
+            return Err(ProjectProblem::Broken(format!("{place}: id {last_id} leaves no room for others")));
         }
         let mut loader = Loader {
             path,
@@ -117,21 +123,22 @@ impl<'a> Loader<'a> {
         let count = record.prefabs.len().max(1) as f32;
         for (index, prefab) in record.prefabs.into_iter().enumerate() {
             progress(&prefab.name, index as f32 / count);
-            loader.add_prefab(prefab)?;
+            loader.add_prefab(&element("prefabs", index, prefab.id.0, &prefab.name), prefab)?;
         }
         loader.shared.clear();
-        for material in record.materials {
-            loader.add_material(material)?;
+        for (index, material) in record.materials.into_iter().enumerate() {
+            let place = element("materials", index, material.id.0, &material.value.name);
+            loader.add_material(&place, material)?;
         }
-        for shapes in record.shapes {
-            loader.add_shapes(shapes)?;
+        for (index, shapes) in record.shapes.into_iter().enumerate() {
+            loader.add_shapes(&element("shapes", index, shapes.id.0, &shapes.mesh.name), shapes)?;
         }
-        for mesh in record.meshes {
-            loader.move_primitives(mesh);
+        for (index, mesh) in record.meshes.into_iter().enumerate() {
+            loader.move_primitives(&element("meshes", index, mesh.id.0, ""), mesh);
         }
         loader.require_room(&record.nodes)?;
-        for node in record.nodes {
-            loader.add_node(node)?;
+        for (index, node) in record.nodes.into_iter().enumerate() {
+            loader.add_node(&element("nodes", index, node.id.0, &node.name), node)?;
         }
         loader.set_environment(record.environment)?;
         if let Some(camera) = record.camera {
@@ -201,13 +208,13 @@ impl Loader<'_> {
         }
     }
 
-    fn add_prefab(&mut self, record: PrefabRecord) -> Result<(), ProjectProblem> {
+    fn add_prefab(&mut self, place: &str, record: PrefabRecord) -> Result<(), ProjectProblem> {
         let (source, allowed) = self.locate(&record.source);
         let package = match allowed {
             Ok(()) => self.import(placeholder(&record, source)),
             Err(reason) => self.without_source(placeholder(&record, source), reason),
         };
-        self.apply(&format!("prefab {}", record.id.0), Edit::AddPrefab(Box::new(package)))
+        self.apply(place, Edit::AddPrefab(Box::new(package)))
     }
 
     /// Imports the source of a placeholder, which stays in its place when the source cannot be read.
@@ -245,57 +252,54 @@ impl Loader<'_> {
     }
 
     /// An edited material of a prefab, or one made in the program.
-    fn add_material(&mut self, record: MaterialRecord) -> Result<(), ProjectProblem> {
+    fn add_material(&mut self, place: &str, record: MaterialRecord) -> Result<(), ProjectProblem> {
         let MaterialRecord { id, value } = record;
-        let value = self.without_lost_textures(id, value);
+        let value = self.without_lost_textures(place, id, value);
         let edit = if self.document.material(id).is_some() {
             Edit::SetMaterial { material: id, value: Box::new(value) }
         } else {
             if self.document.prefabs().any(|(_, prefab)| prefab.asset_names.gone().any(|gone| gone == id.0)) {
                 let message = "was edited, but is not in its source any more; the edit is kept on save";
-                self.warn(format!("material {}", value.name), message.to_owned());
+                self.warn(place.to_owned(), message.to_owned());
             }
             let entry = MaterialEntry { value, original: None };
             Edit::AddMaterial { material: id, entry: Box::new(entry) }
         };
-        self.apply(&format!("material {}", id.0), edit)
+        self.apply(place, edit)
     }
 
     /// Spheres and boxes are made anew from their description. A file that is missing is kept on save.
-    fn add_shapes(&mut self, record: ShapesRecord) -> Result<(), ProjectProblem> {
+    fn add_shapes(&mut self, place: &str, record: ShapesRecord) -> Result<(), ProjectProblem> {
         let ShapesRecord { id, mesh: ShapeMeshRecord { name, source, materials } } = record;
         let source = match source {
             ShapeSource::File(file) => {
                 let (path, allowed) = self.locate(&file.path.to_string_lossy());
-                ShapeSource::File(self.read_shapes(path, allowed))
+                ShapeSource::File(self.read_shapes(place, path, allowed))
             }
             other => other,
         };
-        let problem = |reason: String| ProjectProblem::Broken(format!("shapes {}: {reason}", id.0));
-        let value = Mesh::of_shapes(name, source, &materials).map_err(|fault| problem(fault.to_string()))?;
-        let edit = Edit::AddMesh { mesh: id, value: Box::new(value) };
-        self.document.apply(edit).map(|_| ()).map_err(|error| problem(error.to_string()))
+        let value = Mesh::of_shapes(name, source, &materials)
+            .map_err(|fault| ProjectProblem::Broken(format!("{place}: {fault}")))?;
+        self.apply(place, Edit::AddMesh { mesh: id, value: Box::new(value) })
     }
 
     /// The shapes of a file, or none with a warning.
-    pub fn read_shapes(&mut self, path: PathBuf, allowed: Result<(), String>) -> ShapeFile {
+    pub fn read_shapes(&mut self, place: &str, path: PathBuf, allowed: Result<(), String>) -> ShapeFile {
         let read = allowed.and_then(|()| import::load_shapes(&path).map_err(|error| error.to_string()));
         read.unwrap_or_else(|reason| {
-            self.warn(
-                "shapes".to_owned(),
-                format!("{reason}; nothing stands in its place, and it is kept on save"),
-            );
+            let message = format!("{reason}; nothing stands in its place, and it is kept on save");
+            self.warn(place.to_owned(), message);
             ShapeFile { path, shapes: None }
         })
     }
 
     /// Textures that the source does not have now are kept for the next save, in the slots where they were.
-    fn without_lost_textures(&mut self, id: MaterialId, mut material: Material) -> Material {
+    fn without_lost_textures(&mut self, place: &str, id: MaterialId, mut material: Material) -> Material {
         let mut lost = BTreeMap::new();
-        for (slot, place) in material.texture_slots_mut().enumerate() {
-            if let Some(gone) = place.filter(|used| self.document.texture(used.texture).is_none()) {
+        for (slot, used) in material.texture_slots_mut().enumerate() {
+            if let Some(gone) = used.filter(|used| self.document.texture(used.texture).is_none()) {
                 lost.insert(slot, gone);
-                *place = None;
+                *used = None;
             }
         }
         if !lost.is_empty() {
@@ -304,14 +308,14 @@ impl Loader<'_> {
             let message = format!(
                 "its textures {ids} are not in the source; it is shown without, and they are kept on save"
             );
-            self.warn(format!("material {}", material.name), message);
+            self.warn(place.to_owned(), message);
             self.meta.kept.textures.insert(id, lost);
         }
         material
     }
 
     /// Moves that do not fit the source are kept for the next save.
-    fn move_primitives(&mut self, record: MeshRecord) {
+    fn move_primitives(&mut self, place: &str, record: MeshRecord) {
         let mut left = BTreeMap::new();
         for (&primitive, columns) in &record.primitives {
             let edit = Edit::SetPrimitiveTransform {
@@ -322,7 +326,7 @@ impl Loader<'_> {
             if let Err(error) = self.document.apply(edit) {
                 let message =
                     format!("primitive {primitive} was moved, but {error}; the move is kept on save");
-                self.warn(format!("mesh {}", record.id.0), message);
+                self.warn(place.to_owned(), message);
                 left.insert(primitive, *columns);
             }
         }
@@ -331,33 +335,28 @@ impl Loader<'_> {
         }
     }
 
-    fn add_node(&mut self, mut record: NodeRecord) -> Result<(), ProjectProblem> {
-        let place = format!("node {} \"{}\"", record.id.0, record.name);
+    fn add_node(&mut self, place: &str, mut record: NodeRecord) -> Result<(), ProjectProblem> {
+        let broken = |reason: String| Err(ProjectProblem::Broken(format!("{place}: {reason}")));
         if let Some(reason) = sound::refusal(&record) {
-            return Err(ProjectProblem::Broken(format!("{place}: it {reason}")));
+            return broken(format!("it {reason}"));
         }
         for repaired in sound::repair_rotations(&mut record) {
-            self.warn(place.clone(), repaired);
+            self.warn(place.to_owned(), repaired);
         }
         let (id, node) = record.into_node();
-        if let Some(parent) = node.parent.filter(|parent| self.document.node(*parent).is_none()) {
-            return Err(ProjectProblem::Broken(format!(
-                "node {}: its parent, node {}, does not stand before it in the file; parents come first, and no node \
-                 is below itself",
-                id.0, parent.0
-            )));
+        let parent = node.parent;
+        if let Some(parent) = parent.filter(|parent| self.document.node(*parent).is_none()) {
+            return broken(format!(
+                "its parent, node {}, does not stand before it in the file; parents come first, and no node is below itself",
+                parent.0
+            ));
         }
-        self.stand_in_for_missing(id, &node)?;
-        let edit =
-            Edit::AddNode { parent: node.parent, index: usize::MAX, subtree: Subtree::single(id, node) };
-        self.document
-            .apply(edit)
-            .map(|_| ())
-            .map_err(|error| ProjectProblem::Broken(format!("node {}: {error}", id.0)))
+        self.stand_in_for_missing(place, &node)?;
+        self.apply(place, Edit::AddNode { parent, index: usize::MAX, subtree: Subtree::single(id, node) })
     }
 
     /// What a node names and the file does not have stays named; nothing stands in its place.
-    fn stand_in_for_missing(&mut self, id: NodeId, node: &Node) -> Result<(), ProjectProblem> {
+    fn stand_in_for_missing(&mut self, place: &str, node: &Node) -> Result<(), ProjectProblem> {
         let (mesh, materials): (Option<MeshId>, Vec<MaterialId>) = match &node.kind {
             NodeKind::Mesh { mesh, materials, .. } => (Some(*mesh), materials.clone()),
             NodeKind::Prefab { overrides, .. } => {
@@ -371,13 +370,12 @@ impl Loader<'_> {
         let materials = materials.map(|material| format!("material {}", material.0));
         let missing: Vec<String> =
             mesh.iter().map(|mesh| format!("mesh {}", mesh.0)).chain(materials).collect();
-        let place = format!("node {} \"{}\"", id.0, node.name);
         if !missing.is_empty() {
             let message = format!("{} is not in the file; it stays named on save", missing.join(", "));
-            self.warn(place.clone(), message);
+            self.warn(place.to_owned(), message);
         }
         match mesh {
-            Some(mesh) => self.apply(&place, Edit::AddMesh { mesh, value: Box::new(missing_mesh(mesh)) }),
+            Some(mesh) => self.apply(place, Edit::AddMesh { mesh, value: Box::new(missing_mesh(mesh)) }),
             None => Ok(()),
         }
     }
@@ -398,10 +396,10 @@ impl Loader<'_> {
             Environment::Auto | Environment::DefaultSky => false,
         };
         if shines_below_zero {
-            let reason = "environment: it takes light away: its radiance or scale is below 0";
+            let reason = "/environment: it takes light away: its radiance or scale is below 0";
             return Err(ProjectProblem::Broken(reason.to_owned()));
         }
-        self.apply("environment", Edit::SetEnvironment(environment))
+        self.apply("/environment", Edit::SetEnvironment(environment))
     }
 
     /// Reads the map of an environment, or leaves it without, with a warning.
@@ -415,7 +413,7 @@ impl Loader<'_> {
             }
             Err(reason) => {
                 let message = format!("{reason}; the surroundings are black, and it is kept on save");
-                self.warn("environment".to_owned(), message);
+                self.warn("/environment".to_owned(), message);
                 file
             }
         }
@@ -435,13 +433,13 @@ impl Loader<'_> {
                 .map(|part| Target::part(record.node, part)),
         };
         match target {
-            Some(target) => self.apply("camera", Edit::SetDefaultCamera(Some(target))),
+            Some(target) => self.apply("/camera", Edit::SetDefaultCamera(Some(target))),
             None => {
                 let message = format!(
                     "the chosen camera, of node {}, is not there; it stays chosen on save",
                     record.node.0
                 );
-                self.warn("camera".to_owned(), message);
+                self.warn("/camera".to_owned(), message);
                 self.meta.kept.camera = Some(record);
                 Ok(())
             }

@@ -53,18 +53,27 @@ pub(crate) struct ProjectRecord {
 }
 
 impl ProjectRecord {
-    /// The largest id that anything in the file has.
-    pub fn largest_id(&self) -> u64 {
-        let prefabs = self.prefabs.iter().flat_map(|prefab| {
+    /// The largest id that anything in the file has, or leaves as the last, and where.
+    pub fn largest_id(&self) -> (u64, String) {
+        let of = |list: &'static str, ids: Vec<u64>| {
+            let largest = (0..).zip(ids).max_by_key(|(_, id)| *id);
+            largest.map(|(index, id): (usize, u64)| (id, format!("/{list}/{index}")))
+        };
+        let prefabs = self.prefabs.iter().map(|prefab| {
             let meshes = prefab.meshes.iter().map(|id| id.0);
             let materials = prefab.materials.iter().map(|id| id.0);
             let textures = prefab.textures.iter().map(|id| id.0);
-            meshes.chain(materials).chain(textures).chain(prefab.asset_names.gone()).chain([prefab.id.0])
+            let all = meshes.chain(materials).chain(textures).chain(prefab.asset_names.gone());
+            all.max().unwrap_or(0).max(prefab.id.0)
         });
-        let materials = self.materials.iter().map(|material| material.id.0);
-        let shapes = self.shapes.iter().map(|shapes| shapes.id.0);
-        let nodes = self.nodes.iter().map(|node| node.id.0);
-        prefabs.chain(materials).chain(shapes).chain(nodes).max().unwrap_or(0)
+        let lists = [
+            of("prefabs", prefabs.collect()),
+            of("materials", self.materials.iter().map(|material| material.id.0).collect()),
+            of("shapes", self.shapes.iter().map(|shapes| shapes.id.0).collect()),
+            of("nodes", self.nodes.iter().map(|node| node.id.0).collect()),
+        ];
+        let next = (self.next_id.saturating_sub(1), "/nextId".to_owned());
+        lists.into_iter().flatten().fold(next, |most, other| if other.0 > most.0 { other } else { most })
     }
 }
 

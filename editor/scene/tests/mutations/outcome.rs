@@ -43,13 +43,11 @@ pub fn of(seed: &Seed, folder: &Path) -> Result<bool, String> {
             Ok(project) => warnings(&project.warnings).map(|()| true),
             Err(error) => {
                 let text = error.to_string();
-                // JSON errors have lines, contradictions name ids; the others are about the file.
+                // What is no JSON has a line, what is no project a pointer; the others are about the file.
                 let placed = match error.problem {
                     ProjectProblem::Json(_) => text.contains("line "),
                     ProjectProblem::Broken(reason) => {
-                        let named =
-                            ["environment: ", "camera: "].iter().any(|place| reason.starts_with(place));
-                        named || reason.contains(|c: char| c.is_ascii_digit())
+                        reason.contains('/') || reason.contains("byte order mark")
                     }
                     _ => true,
                 };

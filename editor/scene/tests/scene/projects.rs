@@ -224,8 +224,6 @@ fn other_files_and_newer_versions_are_refused_in_words() {
     assert!(matches!(load(twice).problem, ProjectProblem::Broken(_)));
     let orphan = r#"{"caustica":1,"nodes":[{"id":1,"name":"a","parent":7}]}"#;
     assert!(load(orphan).to_string().contains("node 1"));
-    let typed = load("{\"caustica\":2,\n\"nodes\":[{\"id\":\"x\"}]}");
-    assert!(typed.to_string().contains("line 2"), "{typed}");
     for (node, words) in [
         (
             r#""light":{"color":[1,1,1],"intensity":1,"kind":{"point":{"radius_m":0,"range_m":null}}},
@@ -242,6 +240,64 @@ fn other_files_and_newer_versions_are_refused_in_words() {
     }
     let dark = load(r#"{"caustica":2,"environment":{"kind":"constant","radiance":[0,-1,0]}}"#);
     assert!(dark.to_string().contains("environment: it takes light away"), "{dark}");
+}
+
+#[test]
+fn what_is_wrong_in_a_project_is_named_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.caustica");
+    let chair = |field: &str| format!(r#"[{{"id":1,"name":"a"}},{{"id":7,"name":"Chair",{field}}}]"#);
+    let node = "/nodes/1";
+    let whom = " (node 7 \"Chair\"): ";
+    let place = |inside: &str| format!("{node}{inside}{whom}");
+    let paint = r#"[{"id":3,"value":{"name":"Paint","volume_priority":65536}}]"#;
+    let cases = [
+        (
+            "nodes",
+            chair(r#""local":{"matrix":[1,0,0,0,1,0,0,0,1,0,0,0,1]}"#),
+            place("/local/matrix"),
+            "13 values",
+        ),
+        ("nodes", chair(r#""local":{"matrix":[1,0,0]}"#), place("/local/matrix"), "3 values, expected 12"),
+        ("nodes", chair(r#""clip":7"#), place("/clip"), "it is integer \"7\", expected a name or an object"),
+        ("nodes", chair(r#""visible":"no""#), place("/visible"), "expected true or false"),
+        (
+            "nodes",
+            chair(r#""clip":{"clip":-1}"#),
+            place("/clip/clip"),
+            "expected a whole number from 0 to 4294967295",
+        ),
+        ("nodes", chair(r#""parent":70"#), place(""), "its parent, node 70,"),
+        ("nodes", "{}".to_owned(), "/nodes: ".to_owned(), "expected a list"),
+        (
+            "materials",
+            paint.to_owned(),
+            "/materials/0/value/volume_priority (material 3 \"Paint\"): ".to_owned(),
+            "from 0 to 255",
+        ),
+        ("nextId", "-1".to_owned(), "/nextId: ".to_owned(), "from 0 to"),
+        ("nextId", "18446744073709551615".to_owned(), "/nextId: ".to_owned(), "leaves no room"),
+        (
+            "environment",
+            r#"{"kind":"file"}"#.to_owned(),
+            "/environment: ".to_owned(),
+            "missing field \"path\"",
+        ),
+    ];
+    for version in [1, 2] {
+        for (field, value, place, reason) in &cases {
+            let text = format!("{{\"caustica\":{version},\n\"{field}\":{value}}}");
+            std::fs::write(&path, text).unwrap();
+            let said = Project::load(&path).unwrap_err().to_string();
+            assert!(said.starts_with(&*path.to_string_lossy()), "{said}");
+            assert!(said.contains(place) && said.contains(reason), "{said}; not {place}{reason}");
+            let is_json = said.contains("not a valid project");
+            assert_eq!(is_json, said.contains(" at line 2 column "), "{said}");
+        }
+    }
+    std::fs::write(&path, format!("{{\"caustica\":2,\"nodes\":{}}}", chair(r#""id":8"#))).unwrap();
+    let twice = Project::load(&path).unwrap_err().to_string();
+    assert!(twice.contains("/nodes/1 (node 8 \"Chair\"): duplicate field \"id\" at line 1"), "{twice}");
 }
 
 #[test]

@@ -115,7 +115,7 @@ fn what_was_edited_waits_for_a_source_that_lacks_it() {
     for _ in 0..2 {
         let project = Project::load(&path).unwrap();
         let told = |what: &str| project.warnings.iter().any(|warning| warning.to_string().contains(what));
-        assert!(told("material b") && told("textures") && told("mesh"), "{:?}", project.warnings);
+        assert!(told("(material 6 \"b\")") && told("textures") && told("mesh"), "{:?}", project.warnings);
         assert!(named(&project.document, "c")[0].1.roughness == 1.0);
         Project::save(&path, &project.document, &project.meta).unwrap();
     }
@@ -379,5 +379,5 @@ fn what_is_named_and_not_there_is_told_of() {
     let round = r#"{"caustica":2,"nodes":[{"id":1,"name":"a","parent":2},{"id":2,"name":"b","parent":1}]}"#;
     std::fs::write(&path, round).unwrap();
     let error = Project::load(&path).unwrap_err().to_string();
-    assert!(error.contains("node 1: its parent, node 2"), "{error}");
+    assert!(error.contains("(node 1 \"a\"): its parent, node 2"), "{error}");
 }

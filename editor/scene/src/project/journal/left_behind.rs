@@ -339,7 +339,7 @@ fn with_files(loader: &mut Loader<'_>, edit: Edit) -> Edit {
 
 fn read_source(loader: &mut Loader<'_>, source: ShapeSource) -> ShapeSource {
     match source {
-        ShapeSource::File(file) => ShapeSource::File(loader.read_shapes(file.path, Ok(()))),
+        ShapeSource::File(file) => ShapeSource::File(loader.read_shapes("", file.path, Ok(()))),
         other => other,
     }
 }
@@ -348,7 +348,7 @@ fn with_shapes(loader: &mut Loader<'_>, mesh: Mesh) -> Mesh {
     let Some(ShapeSource::File(file)) = mesh.shapes().map(|shapes| shapes.source().clone()) else {
         return mesh;
     };
-    let source = ShapeSource::File(loader.read_shapes(file.path, Ok(())));
+    let source = ShapeSource::File(loader.read_shapes("", file.path, Ok(())));
     let materials: Vec<_> = mesh.primitives.iter().map(|primitive| primitive.material).collect();
     Mesh::of_shapes(mesh.name.clone(), source, &materials).unwrap_or(mesh)
 }

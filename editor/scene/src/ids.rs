@@ -1,5 +1,6 @@
 //! Persistent ids: what a project file, the undo history and the renderer's instances agree on.
-//! Every id of one document comes from one counter and is never given out twice, also after a delete.
+//! Every id of one document comes from one counter and is never given out twice, also after a delete. A file that somebody else
+//! wrote may use a number once for each kind: nothing may ask for an id without its kind.
 //! A [`Target`] names what can be selected: a node, or one part inside a prefab instance.
 
 use serde::{Deserialize, Serialize};

@@ -36,7 +36,7 @@ impl Copies {
     }
 }
 
-/// Other ids in the place of those that something has. Ids of all kinds come from one counter, so one map serves them all.
+/// Other ids in the place of those that something has. One map serves all kinds: what has one number before has one number after.
 type Renumber<'a> = &'a dyn Fn(u64) -> u64;
 
 impl Document {
@@ -57,14 +57,15 @@ impl Document {
             fresh.entry(id).or_insert_with(|| self.allocate_id());
         }
         let renumber = |id: u64| fresh.get(&id).copied().unwrap_or(id);
+        let own: BTreeSet<MaterialId> = package.materials.iter().map(|(id, _)| *id).collect();
         let mut package = renumbered_package(package, &renumber);
         package.prefab.name = format!("{} copy", package.prefab.name);
         let prefab = package.id;
         let mut edits = vec![Edit::AddPrefab(Box::new(package)), Edit::SetPrefab { node, prefab }];
         // Materials of the prefab that overrides name become those of the copy.
         let slot = self.slots.get(&node);
-        for (&part, own) in slot.iter().flat_map(|slot| &slot.parts.overrides) {
-            for (&primitive, material) in own.materials.iter().filter(|(_, id)| fresh.contains_key(&id.0)) {
+        for (&part, values) in slot.iter().flat_map(|slot| &slot.parts.overrides) {
+            for (&primitive, material) in values.materials.iter().filter(|(_, id)| own.contains(id)) {
                 let (target, material) = (Target::part(node, part), MaterialId(renumber(material.0)));
                 edits.push(Edit::AssignMaterial { target, primitive, material });
             }
@@ -84,16 +85,17 @@ impl Document {
         self.reserve_ids_up_to(last);
         let renumber = |id: u64| id.saturating_add(offset);
         let mut edits: Vec<Edit> = Vec::new();
-        let mut brought = BTreeSet::new();
+        let (mut brought, mut brought_meshes) = (BTreeSet::new(), BTreeSet::new());
         for package in other.prefabs().filter_map(|(id, _)| other.package_of(id)) {
-            brought.extend(ids_of(&package));
+            brought.extend(package.materials.iter().map(|(id, _)| *id));
+            brought_meshes.extend(package.meshes.iter().map(|(id, _)| *id));
             edits.push(Edit::AddPrefab(Box::new(renumbered_package(package, &renumber))));
         }
-        for (&id, entry) in other.materials.iter().filter(|(id, _)| !brought.contains(&id.0)) {
+        for (&id, entry) in other.materials.iter().filter(|(id, _)| !brought.contains(id)) {
             let entry = Box::new(renumbered_material(entry.clone(), &renumber));
             edits.push(Edit::AddMaterial { material: MaterialId(renumber(id.0)), entry });
         }
-        for (id, mesh) in other.meshes().filter(|(id, _)| !brought.contains(&id.0)) {
+        for (id, mesh) in other.meshes().filter(|(id, _)| !brought_meshes.contains(id)) {
             let value = Box::new(renumbered_mesh(mesh.clone(), &renumber));
             edits.push(Edit::AddMesh { mesh: MeshId(renumber(id.0)), value });
         }

@@ -164,7 +164,7 @@ impl Sync {
         let pose = || shape.pose_of(document.deform_pose(renderable.target));
         delta::Instance {
             mesh: delta::MeshId(renderable.mesh.0),
-            render_from_mesh: self.render_from(&renderable.world_from_mesh),
+            render_from_mesh: self.drawn_from(&renderable.world_from_mesh),
             materials: renderable.materials.iter().map(|id| delta::MaterialId(id.0)).collect(),
             visibility: visibility_of(renderable),
             pose: shape.deforms().then(pose).flatten(),
@@ -207,7 +207,7 @@ impl Sync {
         };
         for target in moved.into_iter().filter(|target| !whole.contains(target)) {
             if let Some(world) = document.world_from_mesh(target) {
-                delta.transforms.push((instance_id(target), self.render_from(&world)));
+                delta.transforms.push((instance_id(target), self.drawn_from(&world)));
             }
         }
     }
@@ -247,8 +247,8 @@ impl Sync {
         }
     }
 
-    fn render_from(&self, world: &DAffine3) -> glam::Affine3A {
-        convert::render_from(world, self.origin)
+    fn drawn_from(&self, world: &DAffine3) -> glam::Affine3A {
+        convert::drawn_from(world, self.origin)
     }
 }
 

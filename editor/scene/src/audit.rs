@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use crate::alike;
 use crate::animation::ClipChoice;
@@ -14,7 +14,7 @@ use crate::import::geometry::has_no_area;
 use crate::import::{counted, short};
 use crate::node::NodeKind;
 use crate::prefab::{PartOverride, PartPath, Prefab};
-use crate::transform::is_degenerate;
+use crate::transform::{is_degenerate, is_flat};
 
 mod finding;
 
@@ -157,26 +157,33 @@ impl Audit<'_> {
             }
             // Lights and cameras take no scale from their node.
             let Some(mesh) = mesh else { continue };
-            if is_degenerate(&world) {
-                let message = "it is scaled to nothing in some direction; it is left out".to_owned();
-                self.add(Severity::Error, subject, &name, message);
-                continue;
-            }
             let m = world.matrix3;
             let lengths = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];
             let longest = lengths.into_iter().fold(0.0, f64::max);
             let shortest = lengths.into_iter().fold(f64::INFINITY, f64::min);
-            if longest / shortest > LARGE_SCALE_RATIO {
+            if is_degenerate(&world) {
+                let (severity, message) = match longest > 1.0 {
+                    true => (Severity::Error, "it is larger than single precision can hold; it is left out"),
+                    false => (
+                        Severity::Warning,
+                        "it is scaled to nothing in more than one direction; it is left out",
+                    ),
+                };
+                self.add(severity, subject, &name, message.to_owned());
+                continue;
+            }
+            if is_flat(&world) {
+                let message = "it is scaled to nothing in one direction; it is drawn flat".to_owned();
+                self.add(Severity::Info, subject, &name, message);
+            } else if longest / shortest > LARGE_SCALE_RATIO {
                 let message = format!("its axes are scaled very differently, {:.0} to 1", longest / shortest);
                 self.add(Severity::Warning, subject, &name, message);
             }
             let size = self.document.mesh(mesh).and_then(|m| m.bounds);
-            let size = size.map_or(0.0, |(low, high)| (high - low).length() * longest);
-            if size > 0.0 && world.translation.length() / size > FAR_IN_SIZES {
-                let message = format!(
-                    "it is {:.3e} m from the origin and {size:.3e} m large",
-                    world.translation.length()
-                );
+            let size = size.map_or(0.0, |(low, high)| length(high - low) * longest);
+            let distance = length(world.translation);
+            if size > 0.0 && distance / size > FAR_IN_SIZES {
+                let message = format!("it is {distance:.3e} m from the origin and {size:.3e} m large");
                 self.add(Severity::Info, subject, &name, message);
             }
         }
@@ -224,8 +231,8 @@ impl Audit<'_> {
                 }
             }
             if is_degenerate(&primitive.mesh_from_primitive) {
-                let message = "a primitive is scaled to nothing in some direction".to_owned();
-                self.add(Severity::Error, subject, &mesh.name, message);
+                let message = "a primitive is scaled to nothing in more than one direction".to_owned();
+                self.add(Severity::Warning, subject, &mesh.name, message);
             }
         }
         if degenerate > 0 {
@@ -338,6 +345,12 @@ impl Audit<'_> {
     }
 }
 
+/// Length without squares that overflow.
+fn length(vector: DVec3) -> f64 {
+    let largest = vector.abs().max_element();
+    if largest > 0.0 { largest * (vector / largest).length() } else { 0.0 }
+}
+
 /// What lobes hold that has to be within 0 and 1.
 fn lobe_shares(material: &Material) -> Vec<(&'static str, f32)> {
     let mut shares = Vec::new();
@@ -369,7 +382,7 @@ fn lobe_shares(material: &Material) -> Vec<(&'static str, f32)> {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
-    use glam::{DVec3, Vec3};
+    use glam::Vec3;
     use std::sync::Arc;
 
     use super::*;
@@ -423,8 +436,15 @@ mod tests {
 
     #[test]
     fn faults_are_found() {
-        let flat = with_triangle(DVec3::new(1.0, 0.0, 1.0), Vec3::Y);
-        assert_eq!(audit(&flat)[0].severity, Severity::Error);
+        for (scale, severity, words) in [
+            (DVec3::new(1.0, 0.0, 1.0), Severity::Info, "it is drawn flat"),
+            (DVec3::new(0.0, 0.0, 1.0), Severity::Warning, "nothing in more than one direction"),
+            (DVec3::splat(1e30), Severity::Error, "larger than single precision"),
+        ] {
+            let found = audit(&with_triangle(scale, Vec3::Y));
+            assert_eq!(found[0].severity, severity);
+            assert!(found[0].message.contains(words), "{}", found[0].message);
+        }
         let stretched = with_triangle(DVec3::new(1e6, 1.0, 1.0), Vec3::Y);
         assert!(messages(&stretched)[0].contains("1000000 to 1"));
         let nan = with_triangle(DVec3::ONE, Vec3::NAN);

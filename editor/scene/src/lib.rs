@@ -41,4 +41,4 @@ pub use project::{
     Fingerprint, HeldJournal, Journal, JournalError, LeftBehind, Project, ProjectError, ProjectMeta,
     ProjectProblem, Recovered, RecoveredStep, SCHEMA_VERSION, keep_if_changed,
 };
-pub use transform::{Local, Trs, is_degenerate, rigid};
+pub use transform::{Local, Trs, drawable, is_degenerate, is_flat, rigid};

@@ -6,12 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::project::LocalRecord;
 
+mod flat;
+
+pub(crate) use flat::orthogonal_columns;
+pub use flat::{drawable, is_degenerate, is_flat};
+
 /// Largest relative difference at which a matrix counts as exactly a translation, rotation and scale.
 const EXACT_TRS_TOLERANCE: f64 = 1e-12;
-/// Shortest and longest axis that single precision on the device can square (f32 ends at 3.4e38).
-const AXIS_LENGTH_RANGE: (f64, f64) = (1e-18, 1e18);
-/// Volume of the cell spanned by the unit axes below which a transform counts as flattened.
-const FLAT_VOLUME: f64 = 1e-10;
 
 /// Translation, rotation and scale, applied in the order scale, rotation, translation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -149,27 +150,13 @@ fn exact_trs(matrix: &DAffine3) -> Option<Trs> {
     close.then_some(trs)
 }
 
-/// Whether a transform cannot be rendered: not finite, flattened, or with axes that single precision
-/// cannot hold. Such an instance never reaches the device.
-pub fn is_degenerate(world_from_mesh: &DAffine3) -> bool {
-    if !world_from_mesh.is_finite() {
-        return true;
-    }
-    let m = world_from_mesh.matrix3;
-    let axes = [m.x_axis, m.y_axis, m.z_axis];
-    let (shortest, longest) = AXIS_LENGTH_RANGE;
-    if axes.iter().any(|axis| !(shortest..=longest).contains(&axis.length())) {
-        return true;
-    }
-    let [x, y, z] = axes.map(DVec3::normalize);
-    x.dot(y.cross(z)).abs() < FLAT_VOLUME
-}
-
 /// The part of a placement that a camera uses: rotation and translation without scale or mirroring.
-/// The view axis (-Z) and the up side (+Y) are kept, X completes a right-handed frame.
+/// The view axis (-Z) and the up side (+Y) are kept, X completes a right-handed frame. An axis that is scaled to nothing follows from
+/// the other two.
 pub fn rigid(world_from_node: &DAffine3) -> DAffine3 {
     let m = world_from_node.matrix3;
-    let z = m.z_axis.try_normalize().unwrap_or(DVec3::Z);
-    let x = m.y_axis.cross(z).try_normalize().unwrap_or_else(|| z.any_orthonormal_vector());
+    let z = m.z_axis.try_normalize().or_else(|| m.x_axis.cross(m.y_axis).try_normalize()).unwrap_or(DVec3::Z);
+    let x = m.y_axis.cross(z).try_normalize().or_else(|| (m.x_axis - z * z.dot(m.x_axis)).try_normalize());
+    let x = x.unwrap_or_else(|| z.any_orthonormal_vector());
     DAffine3 { matrix3: DMat3::from_cols(x, z.cross(x), z), translation: world_from_node.translation }
 }

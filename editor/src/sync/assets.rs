@@ -7,7 +7,7 @@ use std::sync::Arc;
 use caustica_renderer::delta::{self, SceneDelta};
 use caustica_scene::{ChangeSet, Document, MaterialId, Mesh, MeshId, Target, TextureId};
 
-use super::convert::{mesh_of, render_from, texture_of};
+use super::convert::{drawn_from, mesh_of, texture_of};
 use super::deform::Shape;
 use super::least_bytes::least_bytes;
 use super::material::material_of;
@@ -188,7 +188,7 @@ impl Assets {
         for (id, index) in changes.primitive_transforms.iter().filter(|(id, _)| !meshes.contains(id)) {
             let primitive = document.mesh(*id).and_then(|mesh| mesh.primitives.get(*index as usize));
             if let Some(primitive) = primitive.filter(|_| is_used(id)) {
-                let map = render_from(&primitive.mesh_from_primitive, glam::DVec3::ZERO);
+                let map = drawn_from(&primitive.mesh_from_primitive, glam::DVec3::ZERO);
                 delta.primitive_transforms.push((delta::MeshId(id.0), *index, map));
             }
         }

@@ -20,6 +20,11 @@ pub fn render_from(world: &DAffine3, origin: DVec3) -> Affine3A {
     Affine3A::from_mat3_translation(m.as_mat3(), (world.translation - origin).as_vec3())
 }
 
+/// The same of what is drawn, which is invertible: what is flat gets a thickness; zero where nothing can be drawn.
+pub fn drawn_from(world: &DAffine3, origin: DVec3) -> Affine3A {
+    scene::drawable(world).map_or(Affine3A::ZERO, |world| render_from(&world, origin))
+}
+
 /// Who sees a placed mesh.
 pub fn visibility_of(renderable: &scene::Renderable) -> delta::Visibility {
     delta::Visibility {
@@ -65,7 +70,7 @@ pub fn mesh_of(mesh: &scene::Mesh) -> delta::Mesh {
             .map(|primitive| delta::Geometry {
                 first_index: primitive.first_index,
                 index_count: primitive.index_count,
-                mesh_from_primitive: render_from(&primitive.mesh_from_primitive, DVec3::ZERO),
+                mesh_from_primitive: drawn_from(&primitive.mesh_from_primitive, DVec3::ZERO),
             })
             .collect(),
         deformation: super::deform::deformation_of(mesh),

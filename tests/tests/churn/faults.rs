@@ -59,12 +59,12 @@ fn picture(session: &mut Session, pipeline: Pipeline) -> Image {
 /// Transforms that leave nothing to be seen, and one that is too large for single precision.
 fn spoilt() -> [(&'static str, Local); 4] {
     let scaled = |scale: DVec3| Local::from(Trs { scale, ..Trs::from_translation(DVec3::Y) });
-    let (x, z) = (DVec3::new(0.3, 0.4, 0.0), DVec3::Z);
-    let alike = DAffine3::from_mat3_translation(DMat3::from_cols(x, x, z), DVec3::Y);
+    let x = DVec3::new(0.3, 0.4, 0.0);
+    let alike = DAffine3::from_mat3_translation(DMat3::from_cols(x, x, x * 2.0), DVec3::Y);
     [
         ("without size", scaled(DVec3::ZERO)),
-        ("two axes alike", Local::Matrix(alike)),
-        ("flat", scaled(DVec3::new(1.0, 0.0, 1.0))),
+        ("all axes alike", Local::Matrix(alike)),
+        ("a line", scaled(DVec3::new(1.0, 0.0, 0.0))),
         ("past single precision", scaled(DVec3::splat(1e300))),
     ]
 }

@@ -1,18 +1,14 @@
 //! Matrices with shear, which a node of the format cannot hold, as two nodes that can. In: a matrix.
 //! Out: the translation, rotation and scale of the outer node, and the rotation of the inner one.
 
-use glam::{DAffine3, DMat3, DQuat};
+use glam::{DAffine3, DQuat};
 
-use crate::transform::{Local, Trs};
+use crate::transform::{Local, Trs, orthogonal_columns};
 
 /// Largest shear, relative to the longest axis, that is the rounding of a matrix in single precision.
 const ROUNDING: f64 = 1e-6;
 /// Matrices of other sizes stay as they are: nothing of them can be drawn.
 const SIZES: std::ops::Range<f64> = 1e-100..1e100;
-/// Angle between two columns, as a cosine, at which they count as orthogonal.
-const ORTHOGONAL: f64 = 1e-16;
-/// Each makes the columns more orthogonal; it takes about six.
-const MOST_SWEEPS: usize = 30;
 
 /// Outer and inner node of a matrix with shear; `None` where one node does.
 ///
@@ -32,39 +28,10 @@ pub(super) fn two_nodes(local: &Local) -> Option<[Trs; 2]> {
     Some([Local::Matrix(outer).nearest_trs(), inner])
 }
 
-/// Orthogonal columns, and the rotation that makes them of those of `matrix`: the first is `matrix * the second`.
-/// The one-sided Jacobi method (Hestenes 1958).
-fn orthogonal_columns(matrix: DMat3) -> (DMat3, DMat3) {
-    let (mut columns, mut turn) = (matrix, DMat3::IDENTITY);
-    for _ in 0..MOST_SWEEPS {
-        let mut done = true;
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            let (a, b) = (columns.col(p), columns.col(q));
-            let product = a.dot(b);
-            if product.abs() <= ORTHOGONAL * a.length() * b.length() {
-                continue;
-            }
-            done = false;
-            let zeta = (b.length_squared() - a.length_squared()) / (2.0 * product);
-            let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
-            let cosine = (1.0 + tangent * tangent).sqrt().recip();
-            for matrix in [&mut columns, &mut turn] {
-                let (a, b) = (matrix.col(p), matrix.col(q));
-                *matrix.col_mut(p) = (a - b * tangent) * cosine;
-                *matrix.col_mut(q) = (a * tangent + b) * cosine;
-            }
-        }
-        if done {
-            break;
-        }
-    }
-    (columns, turn)
-}
-
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
-    use glam::DVec3;
+    use glam::{DMat3, DVec3};
 
     use super::*;
 

@@ -29,6 +29,7 @@ mod limits;
 mod lobes;
 mod locks;
 mod obj;
+mod odd_files;
 mod oracle;
 mod projects;
 mod projects_moved;

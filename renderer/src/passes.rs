@@ -52,6 +52,10 @@ use crate::tables::Tables;
 use crate::view::View;
 use ray_pipeline::RayFiles;
 
+/// Invocations of a workgroup of the passes that go over pixels, and of those that go through tables.
+const PIXEL_GROUP: [u32; 3] = [8, 8, 1];
+const TABLE_GROUP: [u32; 3] = [64, 1, 1];
+
 /// Builds pipelines for one set of needs.
 pub(crate) struct Builder<'a> {
     pub(crate) device: &'a Arc<Device>,
@@ -84,7 +88,7 @@ impl Builder<'_> {
     }
 
     fn compute(&self, label: &'static str, file: &'static str) -> Result<Live<ComputePipeline>> {
-        compute(self.library, &self.owner, self.frame(label), file)
+        compute(self.library, &self.owner, self.frame(label), file, PIXEL_GROUP)
     }
 
     fn raster(
@@ -124,9 +128,11 @@ fn compute(
     owner: &Arc<Owner>,
     frame: Frame,
     file: &'static str,
+    group: [u32; 3],
 ) -> Result<Live<ComputePipeline>> {
     let make = move |stage: StageOf<'_>| {
         let stage = stage(file)?;
+        stage.check_dispatched(group)?;
         let Frame { label, device, specialization, .. } = &frame;
         let (module, interface) = (&stage.module, &stage.interface);
         Ok(ComputePipeline::new(device, label, module, interface, specialization, frame.scene())?)
@@ -144,17 +150,17 @@ fn table_pass(
     let owner = Arc::new(Owner::of_tables());
     let device = Arc::clone(device);
     let frame = Frame { label, device, layout: None, specialization: Specialization::default() };
-    let live = compute(library, &owner, frame, file)?;
+    let live = compute(library, &owner, frame, file, TABLE_GROUP)?;
     // Nothing is bound beside the tables: known before the first frame that needs the pass.
     live.get(&[]);
     Ok(live)
 }
 
-/// Groups of 64 that go through `count` entries of a table; the shader takes several steps where they are too few.
+/// Workgroups that go through `count` entries of a table; the shader takes several steps where they are too few.
 fn table_groups(count: u32) -> [u32; 3] {
     /// What every device allows (Vulkan 1.3, maxComputeWorkGroupCount).
     const MOST_GROUPS: u32 = 65535;
-    [count.div_ceil(64).min(MOST_GROUPS), 1, 1]
+    [count.div_ceil(TABLE_GROUP[0]).min(MOST_GROUPS), 1, 1]
 }
 
 /// What the passes of one frame may touch.
@@ -188,7 +194,8 @@ impl Scope<'_> {
         if pipeline.interface().uses_scene {
             all.extend(self.tables.uses(Stage::Compute));
         }
-        let groups = [self.extent[0].div_ceil(8), self.extent[1].div_ceil(8), 1];
+        let [width, height] = self.extent;
+        let groups = [width.div_ceil(PIXEL_GROUP[0]), height.div_ceil(PIXEL_GROUP[1]), 1];
         let push = self.push(argument0, 0);
         recorder.pass(label, |recorder| {
             recorder.dispatch(&pipeline, Some(self.set), binds, &all, bytemuck::bytes_of(&push), groups)

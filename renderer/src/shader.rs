@@ -2,16 +2,20 @@
 //! Enters: GLSL files, embedded in the binary or from a folder. Leaves: stages, pipelines, and what is wrong with a file.
 
 mod compile;
+mod constants;
 mod fault;
 mod library;
+mod limits;
 mod live;
 mod payloads;
 mod reflect;
 mod reload;
 mod sources;
+mod spirv;
 mod suspects;
 mod twins;
 mod watch;
+mod worker;
 
 pub use compile::{SpirvCache, compile};
 pub use fault::ShaderFault;

@@ -138,7 +138,7 @@ fn source_of(snippet: &Snippet<'_>) -> Source {
     text.push_str("void main() { if (gl_GlobalInvocationID.x < COUNT) { run(gl_GlobalInvocationID.x); } }\n");
     let file = String::from("snippet.comp");
     texts.insert(file.clone(), text);
-    Source { file, texts }
+    Source { file, texts, ..Source::default() }
 }
 
 /// A set 0 whose textures and environment are one white texel; it has no TLAS yet.

@@ -58,7 +58,7 @@ void main() {
 
 fn stage(device: &Arc<Device>, file: &str, body: &str) -> Compiled {
     let texts = BTreeMap::from([(file.to_owned(), format!("#version 460\n{PUSH}{body}"))]);
-    let source = Source { file: file.to_owned(), texts };
+    let source = Source { file: file.to_owned(), texts, ..Source::default() };
     Compiled::new(device, source, &SpirvCache::of_user()).expect("it compiles and fits")
 }
 

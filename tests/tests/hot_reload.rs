@@ -239,6 +239,24 @@ fn what_does_not_fit_the_host_or_the_other_stages_is_named() {
             &["post.comp: binding 'display': expected an image of Rgba16Float, found Rgba32Float"],
         ),
         (
+            "passes/post/post.comp",
+            ("local_size_x = 8, ", "local_size_x = 16, "),
+            &[
+                "post.comp:6: workgroup size: the host expects 8 x 8 x 1, found 16 x 8 x 1\n    layout(local_size_x = 16, ",
+            ],
+        ),
+        (
+            "passes/post/post.comp",
+            (
+                "void main() {",
+                "void main() {\n    int big[100000000];\n    big[gl_LocalInvocationIndex] = 1;",
+            ),
+            &[
+                "variable 'big': expected at most 524288 bytes",
+                "found 400000000\n        int big[100000000];",
+            ],
+        ),
+        (
             "passes/rays/surface.rchit",
             (
                 "hitAttributeEXT vec2 barycentric;",
@@ -250,6 +268,44 @@ fn what_does_not_fit_the_host_or_the_other_stages_is_named() {
         let said = refused(&folder, &mut studio, file, what);
         assert!(words.iter().all(|word| said.contains(word)), "{file}: {said}");
     }
+}
+
+/// What version control, links and build systems do, and what is no file.
+#[cfg(unix)]
+#[test]
+fn folders_are_followed_wherever_they_go_and_what_is_no_file_is_not_waited_for() {
+    let folder = Folder::new();
+    let mut studio = studio(&folder, ViewSettings { pipeline: Pipeline::Raster, ..ViewSettings::default() });
+    let (file, good) = ("passes/post/post.comp", picture(&mut studio));
+    let text = folder.text(file);
+    let is_good = |status: &ShaderStatus| status.faults.is_empty() && !status.compiling;
+    let says = |words: &'static str| {
+        move |status: &ShaderStatus| status.faults.iter().any(|fault| fault.to_string().contains(words))
+    };
+    until(&mut studio, "the start", is_good);
+    fs::rename(folder.path("lib"), folder.path("other")).expect("a renamed folder");
+    let status = until(&mut studio, "renamed away", says("there is no such file"));
+    assert!(status.faults[0].line.is_some(), "{:?}", status.faults);
+    fs::rename(folder.path("other"), folder.path("lib")).expect("a renamed folder");
+    until(&mut studio, "renamed in", is_good);
+
+    fs::remove_dir_all(folder.0.path()).expect("a removed folder");
+    until(&mut studio, "removed", says("the folder of the shaders is not there"));
+    assert!(picture(&mut studio) == good);
+    fs::create_dir(folder.0.path()).expect("a folder");
+    copy(&shader_folder(), folder.0.path());
+    until(&mut studio, "made anew", is_good);
+    let before = studio.renderer.shader_status().reloads;
+    folder.save(file, &format!("{text}// anew\n"), Save::InPlace);
+    until(&mut studio, "the new folder", |status| status.reloads > before);
+
+    fs::remove_file(folder.path(file)).expect("a removed file");
+    let made = Command::new("mkfifo").arg(folder.path(file)).status();
+    assert!(made.expect("a pipe").success());
+    until(&mut studio, "a pipe", says("post.comp: this is a pipe, a socket or a device, and no file"));
+    folder.save(file, &text, Save::RenamedOver);
+    until(&mut studio, "no pipe", is_good);
+    assert!(picture(&mut studio) == good);
 }
 
 #[test]
@@ -374,7 +430,10 @@ fn render_watches_shaders_and_the_scene() {
     watching.wait_for_words(&format!("{file}:{line}:{column}: "));
     watching.wait_for_words("the last picture stays until the shaders are mended");
     assert!(is_red(&watching.picture()));
-    shaders.save(file, &text, Save::RenamedOver);
+    fs::remove_dir_all(shaders.0.path()).expect("a removed folder");
+    watching.wait_for_words("the folder is not there any more");
+    fs::create_dir(shaders.0.path()).expect("a folder");
+    copy(&shader_folder(), shaders.0.path());
     watching.wait_for_picture("the first picture", |picture| picture == first);
 
     let model = watching.folder.path().join("cube.gltf");

@@ -26,7 +26,7 @@ pub struct DeviceOptions {
 }
 
 /// What the device allows; never hard-coded elsewhere.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Limits {
     /// Alignment of the scratch buffer of an acceleration structure build, bytes.
     pub scratch_alignment: u64,
@@ -50,6 +50,12 @@ pub struct Limits {
     pub max_geometries: u64,
     /// Most primitives in a BLAS.
     pub max_primitives: u64,
+    /// Most invocations of a workgroup.
+    pub max_group_invocations: u32,
+    /// Most invocations of a workgroup along each axis.
+    pub max_group_size: [u32; 3],
+    /// Most bytes that a workgroup shares.
+    pub max_shared_bytes: u32,
     /// Bytes of push constants.
     pub max_push_constants: u32,
     /// A buffer of this many bytes is too large.
@@ -371,6 +377,9 @@ fn limits_of(fns: &ash::Instance, physical: vk::PhysicalDevice) -> Limits {
         max_instances: accel.max_instance_count.min(1 << 24),
         max_geometries: accel.max_geometry_count,
         max_primitives: accel.max_primitive_count,
+        max_group_invocations: core.max_compute_work_group_invocations,
+        max_group_size: core.max_compute_work_group_size,
+        max_shared_bytes: core.max_compute_shared_memory_size,
         max_push_constants: core.max_push_constants_size,
         max_buffer_bytes: v13.max_buffer_size.min(v11.max_memory_allocation_size),
         timestamp_mask: u64::MAX,

@@ -101,28 +101,42 @@ pub fn compile(source: &Source, cache: &SpirvCache) -> Result<Vec<u32>> {
 
 /// Serves includes from the texts that were read before.
 struct Includes<'a> {
-    texts: &'a BTreeMap<String, String>,
+    source: &'a Source,
+    /// What was asked for and is not there, with the reason.
+    refused: BTreeMap<String, String>,
 }
 
 impl IncludeHandler for Includes<'_> {
     fn include(&mut self, _: IncludeType, header: &str, _: &str, depth: usize) -> Option<IncludeResult> {
+        let text = self.source.texts.get(header).map(|text| unmarked(text));
         // Files that include each other would fill the memory.
-        if depth > MOST_INCLUDES {
-            return None;
+        let reason = match (depth > MOST_INCLUDES, self.source.missing.get(header)) {
+            (true, _) => format!("more than {MOST_INCLUDES} files include each other"),
+            (false, Some(reason)) => reason.clone(),
+            (false, None) => "files are included as \"PATH\", from the folder of the shaders".to_owned(),
+        };
+        match text.filter(|_| depth <= MOST_INCLUDES) {
+            Some(data) => Some(IncludeResult { name: header.to_owned(), data }),
+            None => {
+                self.refused.insert(header.to_owned(), reason);
+                None
+            }
         }
-        let data = self.texts.get(header).map(|text| unmarked(text));
-        data.map(|data| IncludeResult { name: header.to_owned(), data })
     }
 }
 
 fn compile_now(source: &Source) -> Result<Vec<u32>> {
-    let refuse = |log: String| RendererError::Compile {
+    let mut includes = Includes { source, refused: BTreeMap::new() };
+    words_of(source, &mut includes).map_err(|log| RendererError::Compile {
         file: source.file.clone(),
-        faults: ShaderFault::of_log(&log, &source.file, &source.texts),
-    };
-    let compiler = Compiler::acquire().ok_or_else(|| refuse(String::from("glslang did not start")))?;
-    let stage =
-        stage_of(&source.file).ok_or_else(|| refuse(String::from("unknown stage: see the file's ending")))?;
+        faults: ShaderFault::of_log(&log, source, &includes.refused),
+    })
+}
+
+/// SPIR-V, or what the compiler says.
+fn words_of(source: &Source, includes: &mut Includes<'_>) -> std::result::Result<Vec<u32>, String> {
+    let compiler = Compiler::acquire().ok_or("glslang did not start")?;
+    let stage = stage_of(&source.file).ok_or("unknown stage: see the file's ending")?;
     let text = source.texts.get(&source.file).map(|text| unmarked(text)).unwrap_or_default();
     let options = CompilerOptions {
         source_language: SourceLanguage::GLSL,
@@ -133,12 +147,10 @@ fn compile_now(source: &Source) -> Result<Vec<u32>> {
             | ShaderMessage::DISPLAY_ERROR_COLUMN,
     };
     let glsl = ShaderSource::from(text);
-    let mut includes = Includes { texts: &source.texts };
-    let input =
-        ShaderInput::new(&glsl, stage, &options, None::<&[(&str, Option<&str>)]>, Some(&mut includes))
-            .map_err(|error| refuse(log_of(&error)))?;
-    let shader = compiler.create_shader(input).map_err(|error| refuse(log_of(&error)))?;
-    shader.compile().map_err(|error| refuse(log_of(&error)))
+    let input = ShaderInput::new(&glsl, stage, &options, None::<&[(&str, Option<&str>)]>, Some(includes))
+        .map_err(|error| log_of(&error))?;
+    let shader = compiler.create_shader(input).map_err(|error| log_of(&error))?;
+    shader.compile().map_err(|error| log_of(&error))
 }
 
 /// Without a byte order mark, which the compiler takes for a statement.
@@ -181,7 +193,7 @@ mod tests {
         let texts =
             [("test.comp", text), ("lib/a.glsl", "float a() { return 1.0; }\nfloat b() { return oops; }\n")];
         let texts = texts.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect();
-        Source { file: String::from("test.comp"), texts }
+        Source { file: String::from("test.comp"), texts, ..Source::default() }
     }
 
     #[test]
@@ -201,6 +213,26 @@ mod tests {
         let text = format!("{head}#include \"test.comp\"\nvoid main() {{}}\n");
         let error = compile_now(&source(&text)).unwrap_err().to_string();
         assert!(error.contains("test.comp:"), "{error}");
+    }
+
+    #[test]
+    fn an_include_that_is_not_there_is_an_error_where_the_compiler_comes_to_it() {
+        let head = "#version 460\n#extension GL_GOOGLE_include_directive : require\n";
+        let compiled = |text: &str| {
+            let mut source = source(&format!("{head}{text}\nvoid main() {{}}\n"));
+            source.missing.insert("lib/none.glsl".to_owned(), "there is no such file".to_owned());
+            compile_now(&source).map_err(|error| error.to_string())
+        };
+        assert!(compiled("#if 0\n#include \"lib/none.glsl\"\n#endif").is_ok());
+        let error = compiled("\n#include \"lib/none.glsl\"").unwrap_err();
+        let words =
+            "test.comp:4:1: include \"lib/none.glsl\": there is no such file\n    #include \"lib/none.glsl\"";
+        assert!(error.contains(words), "{error}");
+        let error = compiled("#include <lib/other.glsl>").unwrap_err();
+        assert!(
+            error.contains("test.comp:3:1: include \"lib/other.glsl\": files are included as"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -1,9 +1,15 @@
 //! What is wrong with a shader, with file, line, column and the line itself. Enters: the log of glslang. Leaves: faults.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt;
 
+use super::sources::Source;
 use crate::error::RendererError;
+
+/// So many faults are listed.
+const MOST_LISTED: usize = 20;
+/// So many characters of a line are shown.
+const MOST_SHOWN: usize = 120;
 
 /// One thing that is wrong with a shader.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -18,6 +24,8 @@ pub struct ShaderFault {
     pub message: String,
     /// The text of the line.
     pub source_line: Option<String>,
+    /// How many more there are that are not listed.
+    pub more: usize,
 }
 
 impl ShaderFault {
@@ -37,41 +45,70 @@ impl ShaderFault {
         }
     }
 
-    /// The faults in a log of glslang, which calls the main file `0`. `texts`: every file involved.
-    pub(super) fn of_log(log: &str, main: &str, texts: &BTreeMap<String, String>) -> Vec<Self> {
+    /// The faults in a log of glslang about a main file, which it calls `0`. `refused`: why an include is not there, by path.
+    pub(super) fn of_log(log: &str, source: &Source, refused: &BTreeMap<String, String>) -> Vec<Self> {
         let mut faults: Vec<Self> = Vec::new();
+        let (mut seen, mut more, mut is_listed) = (HashSet::new(), 0, true);
         for line in log.lines().filter(|line| !line.trim().is_empty() && !line.contains("compilation errors"))
         {
-            match line.strip_prefix("ERROR: ").and_then(|rest| Self::of_line(rest, main, texts)) {
-                Some(fault) if faults.contains(&fault) => {}
+            let error = line.strip_prefix("ERROR: ");
+            if error.is_some() {
+                let is_new = seen.insert(line);
+                is_listed = is_new && faults.len() < MOST_LISTED;
+                more += usize::from(is_new && !is_listed);
+            }
+            if !is_listed {
+                continue;
+            }
+            match error.and_then(|rest| Self::of_line(rest, source, refused)) {
                 Some(fault) => faults.push(fault),
                 None => match faults.last_mut() {
                     Some(fault) => fault.message = format!("{}\n{line}", fault.message),
-                    None => faults.push(Self::whole(main, line.trim_start_matches("ERROR: "))),
+                    None => faults.push(Self::whole(&source.file, line.trim_start_matches("ERROR: "))),
                 },
             }
+        }
+        if let Some(last) = faults.last_mut() {
+            last.more = more;
         }
         faults
     }
 
     /// `file:line:column: message`.
-    fn of_line(text: &str, main: &str, texts: &BTreeMap<String, String>) -> Option<Self> {
+    fn of_line(text: &str, source: &Source, refused: &BTreeMap<String, String>) -> Option<Self> {
         let (file, rest) = text.split_once(':')?;
         let (number, message) = rest.split_once(':')?;
         let line: u32 = number.trim().parse().ok()?;
-        let file = if file == "0" { main } else { file };
-        let source_line = texts.get(file).and_then(|text| text.lines().nth(line.saturating_sub(1) as usize));
+        let file = if file == "0" { &source.file } else { file };
+        let source_line =
+            source.texts.get(file).and_then(|text| text.lines().nth(line.saturating_sub(1) as usize));
         let said = message.split_once(':').and_then(|(column, rest)| Some((column.parse().ok()?, rest)));
         let (end, message) = said.map_or((None, message), |(column, rest): (u32, _)| (Some(column), rest));
         let message = message.trim();
         let column = source_line.and_then(|line| place_in(line, quoted(message), end));
+        let include = message.split_once("for header name: ").map(|(_, path)| path.trim());
+        let include = include.and_then(|path| Some(format!("include \"{path}\": {}", refused.get(path)?)));
         Some(Self {
             file: file.to_owned(),
             line: Some(line),
             column,
-            message: message.to_owned(),
+            message: include.unwrap_or_else(|| message.to_owned()),
             source_line: source_line.map(str::to_owned),
+            more: 0,
         })
+    }
+
+    /// In order of their places, each once, and no more of them than are listed.
+    pub(super) fn in_order(mut faults: Vec<Self>) -> Vec<Self> {
+        faults.sort_by(|a, b| {
+            (&a.file, a.line, a.column, &a.message).cmp(&(&b.file, b.line, b.column, &b.message))
+        });
+        faults.dedup();
+        let beyond = faults.split_off(MOST_LISTED.min(faults.len()));
+        if let Some(last) = faults.last_mut() {
+            last.more += beyond.iter().map(|fault| 1 + fault.more).sum::<usize>();
+        }
+        faults
     }
 }
 
@@ -116,14 +153,33 @@ impl fmt::Display for ShaderFault {
             write!(f, ":{number}")?;
         }
         write!(f, ": {}", self.message)?;
-        let Some(line) = &self.source_line else { return Ok(()) };
-        // Tabs stay tabs, so that the mark stands below its column.
-        let blank = |c: char| if c == '\t' { c } else { ' ' };
-        write!(f, "\n    {line}")?;
-        let Some(column) = self.column else { return Ok(()) };
-        let indent: String = line.chars().take(column.saturating_sub(1) as usize).map(blank).collect();
-        write!(f, "\n    {indent}^")
+        if let Some(line) = &self.source_line {
+            write_line(f, line, self.column)?;
+        }
+        match self.more {
+            0 => Ok(()),
+            1 => write!(f, "\nand one more error"),
+            more => write!(f, "\nand {more} more errors"),
+        }
     }
+}
+
+/// A line, of a long one what is around the column, and below it a mark at the column.
+fn write_line(f: &mut fmt::Formatter<'_>, line: &str, column: Option<u32>) -> fmt::Result {
+    let at = column.unwrap_or(1).saturating_sub(1) as usize;
+    let count = line.chars().count();
+    let first = at.saturating_sub(MOST_SHOWN / 2).min(count.saturating_sub(MOST_SHOWN));
+    let shown: String = line.chars().skip(first).take(MOST_SHOWN).collect();
+    let [before, after] =
+        [first > 0, first + MOST_SHOWN < count].map(|cut| if cut { "\u{2026}" } else { "" });
+    write!(f, "\n    {before}{shown}{after}")?;
+    if column.is_none() {
+        return Ok(());
+    }
+    // Tabs stay tabs, so that the mark stands below its column.
+    let blank = |c: char| if c == '\t' { c } else { ' ' };
+    let indent: String = before.chars().chain(shown.chars().take(at - first)).map(blank).collect();
+    write!(f, "\n    {indent}^")
 }
 
 /// The faults one below the other.
@@ -135,13 +191,38 @@ pub(crate) fn listed(faults: &[ShaderFault]) -> String {
 mod tests {
     use super::*;
 
+    fn source(texts: &[(&str, &str)]) -> Source {
+        let texts = texts.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect();
+        Source { file: "a.comp".to_owned(), texts, ..Source::default() }
+    }
+
+    #[test]
+    fn of_many_faults_the_first_are_listed_and_of_long_lines_what_is_around_the_column() {
+        let long = format!("{}oops{}", "a ".repeat(300), " b".repeat(300));
+        let source = source(&[("a.comp", &long)]);
+        let line = |n: usize| format!("ERROR: 0:1:602: 'oops' : {n}\nof it\n");
+        let log: String = (0..20_000).chain(0..5).map(line).collect();
+        let faults = ShaderFault::of_log(&log, &source, &BTreeMap::new());
+        assert_eq!((faults.len(), faults[19].more), (20, 19_980));
+        assert_eq!(faults[19].message, "'oops' : 19\nof it");
+        let (around, after) = ("a ".repeat(30), " b".repeat(28));
+        let shown = format!(
+            "a.comp:1:601: 'oops' : 19\nof it\n    \u{2026}{around}oops{after}\u{2026}\n    {}^\nand 19980 more errors",
+            " ".repeat(61)
+        );
+        assert_eq!(faults[19].to_string(), shown);
+        let two = [faults, vec![ShaderFault::whole("b.comp", "more")]].concat();
+        let listed = ShaderFault::in_order(two);
+        assert_eq!((listed.len(), listed.iter().map(|fault| fault.more).sum::<usize>()), (20, 19_981));
+    }
+
     #[test]
     fn a_fault_names_the_place_and_shows_the_line() {
-        let texts = [("a.comp", "void main() {\n\tint x = xy + y;\n}\n"), ("lib/b.glsl", "oops;\n")];
-        let texts = texts.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect();
+        let source =
+            source(&[("a.comp", "void main() {\n\tint x = xy + y;\n}\n"), ("lib/b.glsl", "oops;\n")]);
         let log = "ERROR: 0:2:15: 'y' : undeclared identifier\nERROR: 0:2:15: 'y' : undeclared identifier\n\
                    ERROR: lib/b.glsl:1:4: '' : syntax error\nERROR: lib/b.glsl:1: 'x' : of a line\nERROR: 2 compilation errors.  No code generated.\n\n";
-        let faults = ShaderFault::of_log(log, "a.comp", &texts);
+        let faults = ShaderFault::of_log(log, &source, &BTreeMap::new());
         assert_eq!(faults.len(), 3, "{faults:?}");
         let shown = listed(&faults);
         assert_eq!(
@@ -156,7 +237,7 @@ mod tests {
         assert_eq!(place_in("", None, Some(1)), Some(1));
         assert_eq!(place_in("x", None, Some(0)), None);
         assert_eq!(
-            ShaderFault::of_log("no place", "a.comp", &texts),
+            ShaderFault::of_log("no place", &source, &BTreeMap::new()),
             [ShaderFault::whole("a.comp", "no place")]
         );
     }

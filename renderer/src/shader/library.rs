@@ -11,6 +11,7 @@ use caustica_gpu::{Device, Interface, ShaderModule};
 
 use super::compile::{SpirvCache, compile};
 use super::fault::ShaderFault;
+use super::limits::{self, GroupSize};
 use super::live::{Live, Make, Owner, Replaceable};
 use super::payloads::RayInterface;
 use super::reflect::reflect;
@@ -24,6 +25,8 @@ pub struct Compiled {
     pub module: ShaderModule,
     /// What it binds.
     pub interface: Interface,
+    /// Size of its workgroups, if it has them.
+    group: Option<GroupSize>,
     pub(super) rays: RayInterface,
     pub(super) source: Source,
 }
@@ -32,12 +35,21 @@ impl Compiled {
     /// Compiles a main file with everything it includes, or takes an earlier result from the cache.
     ///
     /// # Errors
-    /// When it does not compile, or binds what the host does not offer.
+    /// When it does not compile, takes more than the device has, or binds what the host does not offer.
     pub fn new(device: &Arc<Device>, source: Source, cache: &SpirvCache) -> Result<Self> {
         let words = compile(&source, cache)?;
         let interface = reflect(&source.file, &words)?.interface;
+        let group = limits::check(&source, &words, device.limits())?;
         let module = ShaderModule::new(device, &source.file, &words)?;
-        Ok(Self { module, interface, rays: RayInterface::of(&words), source })
+        Ok(Self { module, interface, group, rays: RayInterface::of(&words), source })
+    }
+
+    /// Whether its workgroups are those that the host counts with.
+    ///
+    /// # Errors
+    /// [`RendererError::Compile`] with the place: expected against found.
+    pub(crate) fn check_dispatched(&self, expected: GroupSize) -> Result<()> {
+        limits::check_dispatched(&self.source, self.group, expected)
     }
 
     /// Its name without the folder.

@@ -5,11 +5,11 @@ use std::collections::{BTreeMap, HashMap};
 
 use caustica_gpu::MAX_LINKED_PAYLOAD;
 
+use super::constants::Constants;
 use super::library::Compiled;
-use super::twins::text_of;
+use super::spirv::{instructions, text_of};
 use crate::error::{RendererError, Result};
 
-const HEADER_WORDS: usize = 5;
 /// The attribute of a hit on a triangle (VK_KHR_ray_tracing_pipeline).
 const BARYCENTRIC: &str = "float32x2";
 const RAY_PAYLOAD: u32 = 5338;
@@ -31,16 +31,13 @@ impl RayInterface {
     /// Reads a module.
     pub(super) fn of(words: &[u32]) -> Self {
         let mut types: HashMap<u32, String> = HashMap::new();
-        let mut constants: HashMap<u32, u32> = HashMap::new();
+        let constants = Constants::of(words);
         let mut pointees: HashMap<u32, (String, String)> = HashMap::new();
         let mut names: HashMap<u32, String> = HashMap::new();
         let mut found = Self::default();
-        let mut at = HEADER_WORDS;
-        while let Some(&first) = words.get(at) {
-            let length = (first >> 16) as usize;
-            let Some(instruction) = words.get(at..at + length).filter(|_| length > 0) else { break };
+        for instruction in instructions(words) {
             let named = |id: &u32| types.get(id).cloned().unwrap_or_else(|| String::from("?"));
-            match (first & 0xffff, instruction) {
+            match instruction {
                 (5, [_, id, text @ ..]) => drop(names.insert(*id, text_of(text))),
                 (20, [_, id, ..]) => drop(types.insert(*id, "bool".to_owned())),
                 (21, [_, id, width, signed, ..]) => {
@@ -51,22 +48,18 @@ impl RayInterface {
                 (23, [_, id, of, count, ..]) => drop(types.insert(*id, format!("{}x{count}", named(of)))),
                 (24, [_, id, of, count, ..]) => drop(types.insert(*id, format!("{}x{count}", named(of)))),
                 (28, [_, id, of, count, ..]) => {
-                    let count = constants.get(count).copied().unwrap_or_default();
+                    let count = constants.get(*count).unwrap_or_default();
                     types.insert(*id, format!("{}[{count}]", named(of)));
                 }
                 (30, [_, id, members @ ..]) => {
                     let members: Vec<String> = members.iter().map(named).collect();
                     types.insert(*id, format!("{{{}}}", members.join(", ")));
                 }
-                (43, [_, _, id, value, ..]) => drop(constants.insert(*id, *value)),
                 (32, [_, id, RAY_PAYLOAD | HIT_ATTRIBUTE | INCOMING_RAY_PAYLOAD, of, ..]) => {
                     pointees.insert(*id, (names.get(of).cloned().unwrap_or_else(|| named(of)), named(of)));
                 }
                 (59, [_, pointer, _, class, ..]) => {
-                    let Some((name, ty)) = pointees.get(pointer).cloned() else {
-                        at += length;
-                        continue;
-                    };
+                    let Some((name, ty)) = pointees.get(pointer).cloned() else { continue };
                     match *class {
                         RAY_PAYLOAD => drop(found.sent.insert(name, ty)),
                         INCOMING_RAY_PAYLOAD => found.received = Some((name, ty)),
@@ -75,7 +68,6 @@ impl RayInterface {
                 }
                 _ => {}
             }
-            at += length;
         }
         found
     }

@@ -8,6 +8,7 @@ use spirq::spirv::ImageFormat;
 use spirq::ty::{AccessType, DescriptorType, Type};
 use spirq::var::Variable;
 
+use super::constants::with_plain_constants;
 use crate::error::{RendererError, Result};
 
 /// Interface of one stage.
@@ -32,7 +33,7 @@ pub fn reflect(file: &str, words: &[u32]) -> Result<Reflection> {
     let refuse = |reason: String| RendererError::Interface { file: file.to_owned(), reason };
     super::twins::check(words).map_err(refuse)?;
     let entry_points = ReflectConfig::new()
-        .spv(without_boolean_spec_ops(words))
+        .spv(with_plain_constants(words))
         .ref_all_rscs(false)
         .combine_img_samplers(false)
         .reflect()
@@ -69,35 +70,6 @@ pub fn reflect(file: &str, words: &[u32]) -> Result<Reflection> {
     }
     interface.bindings.sort_by_key(|binding| binding.binding);
     Ok(Reflection { interface })
-}
-
-/// Replaces boolean expressions of specialisation constants by `true`: spirq evaluates them and does not know every
-/// operator, and no binding depends on them.
-fn without_boolean_spec_ops(words: &[u32]) -> Vec<u32> {
-    const HEADER_WORDS: usize = 5;
-    const OP_NOP: u32 = 1;
-    const OP_TYPE_BOOL: u32 = 20;
-    const OP_CONSTANT_TRUE: u32 = 41;
-    const OP_SPEC_CONSTANT_OP: u32 = 52;
-    let mut result = words.to_vec();
-    let mut bool_types = Vec::new();
-    let mut at = HEADER_WORDS;
-    while let Some(&first) = words.get(at) {
-        let (length, opcode) = ((first >> 16) as usize, first & 0xffff);
-        if length == 0 || at + length > words.len() {
-            break;
-        }
-        match (opcode, words.get(at + 1)) {
-            (OP_TYPE_BOOL, Some(id)) => bool_types.push(*id),
-            (OP_SPEC_CONSTANT_OP, Some(kind)) if bool_types.contains(kind) => {
-                result[at] = (3 << 16) | OP_CONSTANT_TRUE;
-                result[at + 3..at + length].fill((1 << 16) | OP_NOP);
-            }
-            _ => {}
-        }
-        at += length;
-    }
-    result
 }
 
 fn check_scene_binding(file: &str, name: &str, binding: u32, found: &DescriptorType) -> Result<()> {
@@ -142,4 +114,45 @@ fn kind_of(descriptor: &DescriptorType) -> Option<BindingKind> {
         DescriptorType::AccelStruct() => BindingKind::AccelStructure,
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+    use super::super::compile::{SpirvCache, compile};
+    use super::super::sources::Source;
+    use super::*;
+
+    /// Operations on specialisation constants of every kind; an array of a binding has a length made of them.
+    #[test]
+    fn constants_that_are_specialised_refuse_no_shader() {
+        let text = "#version 460
+            layout(local_size_x = 8, local_size_y = 8) in;
+            layout(constant_id = 0) const int n = 7;
+            layout(constant_id = 1) const bool b = false;
+            layout(constant_id = 2) const uint u = 9u;
+            layout(constant_id = 3) const float f = 0.5;
+            layout(constant_id = 4) const double d = 0.5lf;
+            const int length = b ? n : ((n * 3 - 1) / 2 % 6 << 1) + int(u > 3u) + (-n & 3) + (~n ^ -8) + int(u >> 1);
+            const double wide = double(f);
+            const float narrow = float(d);
+            const ivec2 pair = ivec2(n, 3) + 1;
+            const int second = pair.y;
+            layout(set = 1, binding = 0) buffer Numbers { float numbers[length]; int more[second]; };
+            void main() { numbers[0] = narrow + float(wide) + (b ? 1.0 : f); more[0] = pair.x; }";
+        let texts = [("a.comp".to_owned(), text.to_owned())].into();
+        let source = Source { file: "a.comp".to_owned(), texts, ..Source::default() };
+        let words = compile(&source, &SpirvCache::default()).unwrap();
+        let found = reflect("a.comp", &words).unwrap().interface.bindings;
+        assert_eq!(found.len(), 1);
+        assert!(matches!(found[0].kind, BindingKind::StorageBuffer(_)), "{found:?}");
+        let constants = super::super::constants::Constants::of(&words);
+        // (20 / 2 % 6 << 1) + 1 + 1 + 0 + 4
+        let lengths = super::super::spirv::instructions(&words).filter_map(|instruction| match instruction {
+            (28, [_, _, _, length]) => constants.get(*length),
+            _ => None,
+        });
+        assert_eq!(lengths.take(2).collect::<Vec<_>>(), [14, 4]);
+    }
 }

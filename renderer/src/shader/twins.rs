@@ -3,9 +3,9 @@
 
 use std::collections::HashMap;
 
+use super::spirv::{instructions, text_of};
 use crate::gpu_types::{Twin, twins};
 
-const HEADER_WORDS: usize = 5;
 const OP_NAME: u32 = 5;
 const OP_MEMBER_NAME: u32 = 6;
 const OP_MEMBER_DECORATE: u32 = 72;
@@ -62,11 +62,8 @@ fn compare(structs: &Structs, id: u32, twin: &Twin) -> Result<(), String> {
 
 fn read(words: &[u32]) -> Structs {
     let mut structs = Structs::default();
-    let mut at = HEADER_WORDS;
-    while let Some(&first) = words.get(at) {
-        let length = (first >> 16) as usize;
-        let Some(instruction) = words.get(at..at + length).filter(|_| length > 0) else { break };
-        match (first & 0xffff, instruction) {
+    for instruction in instructions(words) {
+        match instruction {
             (OP_NAME, [_, id, text @ ..]) => {
                 structs.names.insert(*id, text_of(text));
             }
@@ -78,14 +75,6 @@ fn read(words: &[u32]) -> Structs {
             }
             _ => {}
         }
-        at += length;
     }
     structs
-}
-
-/// A literal string: UTF-8, four bytes a word, ended by a zero.
-pub(super) fn text_of(words: &[u32]) -> String {
-    let bytes: Vec<u8> =
-        words.iter().flat_map(|word| word.to_le_bytes()).take_while(|byte| *byte != 0).collect();
-    String::from_utf8_lossy(&bytes).into_owned()
 }

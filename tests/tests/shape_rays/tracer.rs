@@ -89,7 +89,7 @@ fn own(device: &Arc<Device>, file: &str, body: &str) -> Compiled {
         texts.extend(sources.load(include).expect("an include").texts);
     }
     texts.insert(file.to_owned(), format!("{HEAD}{body}"));
-    built(device, Source { file: file.to_owned(), texts })
+    built(device, Source { file: file.to_owned(), texts, ..Source::default() })
 }
 
 fn built(device: &Arc<Device>, source: Source) -> Compiled {

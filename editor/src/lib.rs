@@ -22,6 +22,7 @@ mod reference;
 pub mod session;
 mod sync;
 mod theme;
+mod typed;
 mod ui_renderer;
 mod ui_state;
 mod whole_file;

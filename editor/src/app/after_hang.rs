@@ -114,6 +114,7 @@ impl Editor {
         self.state.toasts.error(told);
         if let Some(folder) = self.session.shader_folder() {
             let shown = after.shown_shader.take().or_else(|| Some(after.held.first()?.file.clone()));
+            // What stays as it is was put back already, from a file that is newer.
             self.state.shaders.put_back(&folder, std::mem::take(&mut after.typed), shown);
         }
         let (journal, opened) = (after.journal.take(), after.opened.take());

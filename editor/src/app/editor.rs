@@ -14,6 +14,7 @@ use super::after_hang::AfterHang;
 use super::export::Exporting;
 use super::files::Loading;
 use super::recovery::{Recovering, Watch};
+use super::shaders::TypedTexts;
 use crate::dialogs::{Dialogs, Wish};
 use crate::panels::{self, Cx, bars, overlays};
 use crate::session::Session;
@@ -53,6 +54,8 @@ pub struct Editor {
     pub(super) recovering: Option<Recovering>,
     /// Journals of processes that may just be ending.
     pub(super) watch: Watch,
+    /// Keeps texts of shaders that are not saved.
+    pub(super) typed: TypedTexts,
     /// The file that was opened; a model does not become the project's file.
     pub(super) opened: Option<PathBuf>,
     /// What selection and view are to be once the scene is back.
@@ -94,6 +97,7 @@ impl Editor {
             later: BTreeSet::new(),
             recovering: None,
             watch: Watch::default(),
+            typed: TypedTexts::default(),
             opened: None,
             restoring: None,
             outside: None,
@@ -141,6 +145,7 @@ impl Editor {
         self.poll_exporting();
         self.poll_recovering();
         self.look_again(&context);
+        self.look_for_typed(&context);
         if let Some(fault) = self.session.scene_mut().take_journal_fault() {
             self.state.toasts.error(fault);
         }
@@ -154,6 +159,7 @@ impl Editor {
         for action in std::mem::take(&mut self.state.actions) {
             self.perform(action);
         }
+        self.keep_typed();
         // A gesture lasts for as long as a button is held.
         if !context.input(|input| input.pointer.any_down()) && self.state.view.drag.is_none() {
             self.session.end_gesture();

@@ -181,12 +181,16 @@ impl EditorWindow {
                 ..SessionOptions::default()
             },
         )?;
-        match recovery::folder() {
-            Some(folder) => session.scene_mut().keep_journal(&folder),
+        let kept = recovery::folder();
+        match &kept {
+            Some(folder) => session.scene_mut().keep_journal(folder),
             None => tracing::warn!("unsaved changes are not kept: neither XDG_DATA_HOME nor HOME is set"),
         }
         let mut editor = Editor::new(session, config, wake);
         editor.state.log = log;
+        if let Some(folder) = &kept {
+            editor.keep_typed_in(folder);
+        }
         tracing::info!("{} ({})", device.name(), device.driver());
         let rescue = Rescue::new(&device, editor.session.shader_library(), after_hang.is_some());
         if let Some(after) = after_hang {

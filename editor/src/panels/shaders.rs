@@ -114,7 +114,13 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, folder: &Path, status: &ShaderStatus) {
 }
 
 fn state(ui: &mut Ui, status: &ShaderStatus) {
-    if status.compiling {
+    if let Some((name, seconds)) = status.slow.first() {
+        ui.spinner();
+        let text = format!(
+            "{name} has been compiled for {seconds} s and is not ready; what is saved meanwhile waits"
+        );
+        ui.colored_label(ui.visuals().warn_fg_color, text);
+    } else if status.compiling {
         ui.spinner();
         ui.label("compiling");
     } else if let Some(last) = &status.last {

@@ -71,15 +71,27 @@ impl ShaderTexts {
         modified.map(|(file, text)| (file.clone(), text.now.clone())).collect()
     }
 
-    /// Opens the texts again that another process had not saved, and the file that it showed.
-    pub fn put_back(&mut self, folder: &Path, unsaved: BTreeMap<String, String>, shown: Option<String>) {
+    /// Opens the texts again that another process had not saved, and the file that it showed. Gives the files that stay as they
+    /// are, as another text was typed in them here.
+    pub fn put_back(
+        &mut self,
+        folder: &Path,
+        unsaved: BTreeMap<String, String>,
+        shown: Option<String>,
+    ) -> Vec<String> {
+        let mut other = Vec::new();
         for (file, now) in unsaved {
+            if self.open.get(&file).is_some_and(|text| text.now != text.saved && text.now != now) {
+                other.push(file);
+                continue;
+            }
             let saved = read(folder, &file).unwrap_or_default();
             self.open.insert(file, Text { now, saved });
         }
         if let Some(Err(error)) = shown.map(|file| self.show(folder, &file, None)) {
             tracing::debug!("{error}");
         }
+        other
     }
 
     /// Saves the text that is shown. What another program has saved meanwhile is kept beside it, and the log says where.
@@ -216,7 +228,9 @@ mod tests {
         assert!(texts.text_mut().unwrap().ends_with("// mine\n"));
         let mut again = ShaderTexts::default();
         texts.show(folder.path(), file, None).unwrap();
-        again.put_back(folder.path(), texts.unsaved(), Some(file.to_owned()));
+        assert!(again.put_back(folder.path(), texts.unsaved(), Some(file.to_owned())).is_empty());
+        let other = BTreeMap::from([(file.to_owned(), "of a third one".to_owned())]);
+        assert_eq!(again.put_back(folder.path(), other, None), [file], "what was typed stays");
         assert_eq!(again.modified(), [file]);
         assert_eq!(again.text_mut(), texts.text_mut());
         texts.save(folder.path()).unwrap();

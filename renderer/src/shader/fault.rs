@@ -68,10 +68,18 @@ impl ShaderFault {
                 },
             }
         }
-        if let Some(last) = faults.last_mut() {
+        if faults.iter().any(Self::is_of_include) {
+            // What else is wrong may only be so without it.
+            faults.retain(Self::is_of_include);
+        } else if let Some(last) = faults.last_mut() {
             last.more = more;
         }
         faults
+    }
+
+    /// Whether an included file is not there.
+    fn is_of_include(&self) -> bool {
+        self.message.starts_with("include \"")
     }
 
     /// `file:line:column: message`.
@@ -98,12 +106,14 @@ impl ShaderFault {
         })
     }
 
-    /// In order of their places, each once, and no more of them than are listed.
+    /// In order of their places, each once, a file that is not there too, and no more of them than are listed.
     pub(super) fn in_order(mut faults: Vec<Self>) -> Vec<Self> {
         faults.sort_by(|a, b| {
             (&a.file, a.line, a.column, &a.message).cmp(&(&b.file, b.line, b.column, &b.message))
         });
         faults.dedup();
+        let mut includes = HashSet::new();
+        faults.retain(|fault| !fault.is_of_include() || includes.insert(fault.message.clone()));
         let beyond = faults.split_off(MOST_LISTED.min(faults.len()));
         if let Some(last) = faults.last_mut() {
             last.more += beyond.iter().map(|fault| 1 + fault.more).sum::<usize>();
@@ -211,7 +221,9 @@ mod tests {
             " ".repeat(61)
         );
         assert_eq!(faults[19].to_string(), shown);
-        let two = [faults, vec![ShaderFault::whole("b.comp", "more")]].concat();
+        let includes = |file: &&str| ShaderFault::whole(file, "include \"c\": there is no such file");
+        let included: Vec<_> = ["b.comp", "c.comp"].iter().map(includes).collect();
+        let two = [faults, included].concat();
         let listed = ShaderFault::in_order(two);
         assert_eq!((listed.len(), listed.iter().map(|fault| fault.more).sum::<usize>()), (20, 19_981));
     }

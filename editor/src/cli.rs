@@ -261,7 +261,9 @@ fn logged(run: impl FnOnce() -> anyhow::Result<ExitCode>) -> anyhow::Result<Exit
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
         .finish();
-    tracing::subscriber::with_default(subscriber, run)
+    // Of all threads: shaders are watched and compiled by others. There is another one only where a test runs several commands.
+    let _ = tracing::subscriber::set_global_default(subscriber);
+    run()
 }
 
 /// 3 when the device is at fault, else 1.

@@ -1,4 +1,4 @@
-//! From saving a shader to the first picture made with it, for each main file of two pipelines, beside what the driver itself takes
+//! From saving a shader to the first picture made with it, for each main file of every pipeline, beside what the driver itself takes
 //! to make the pipelines; and how long frames take meanwhile. Enters: a project. Leaves: milliseconds.
 
 use std::collections::BTreeSet;
@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use caustica_renderer::gpu::DeviceKind;
-use caustica_renderer::{Pipeline, Primary, ViewSettings, WakeFn};
+use caustica_renderer::shader::ShaderSources;
+use caustica_renderer::{NeedsMode, Pipeline, Primary, Show, ViewSettings, WakeFn};
 use serde::Serialize;
 use serde_json::json;
 
@@ -54,8 +55,18 @@ struct LinkedRow {
     ratio: Option<f64>,
 }
 
-const WAYS: [(Pipeline, Primary); 3] =
-    [(Pipeline::Hybrid, Primary::Raster), (Pipeline::Hybrid, Primary::Rays), (Pipeline::Path, Primary::Rays)];
+/// Pictures that are made most often, with what their scene needs; and views that together use every other stage, with all of it.
+const WAYS: [(Pipeline, Primary, NeedsMode, Show); 7] = [
+    (Pipeline::Hybrid, Primary::Raster, NeedsMode::Auto, Show::Image),
+    (Pipeline::Hybrid, Primary::Rays, NeedsMode::Auto, Show::Image),
+    (Pipeline::Path, Primary::Rays, NeedsMode::Auto, Show::Image),
+    (Pipeline::Hybrid, Primary::Raster, NeedsMode::All, Show::Shadow),
+    (Pipeline::Raster, Primary::Raster, NeedsMode::All, Show::Normal),
+    (Pipeline::Raster, Primary::Raster, NeedsMode::All, Show::Wireframe),
+    (Pipeline::Raster, Primary::Raster, NeedsMode::All, Show::NonFinite),
+];
+/// The endings of main files.
+const STAGES: [&str; 8] = ["comp", "vert", "frag", "rgen", "rchit", "rahit", "rmiss", "rint"];
 
 pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
     let on_processor = bench.device.kind() == DeviceKind::Cpu;
@@ -66,10 +77,13 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
     };
     let mut seen = BTreeSet::new();
     let (mut rows, mut linked) = (Vec::new(), Vec::new());
-    for (pipeline, primary) in WAYS {
+    for (pipeline, primary, needs, show) in WAYS {
+        if bench.quick && needs == NeedsMode::All {
+            continue;
+        }
         let folder = tempfile::tempdir()?;
         write_built_in(folder.path()).map_err(anyhow::Error::msg)?;
-        let settings = ViewSettings { pipeline, primary, ..ViewSettings::default() };
+        let settings = ViewSettings { pipeline, primary, needs, show, ..ViewSettings::default() };
         let mut session = session_of(bench, Some(folder.path()), &settings, extent_px)?;
         let files: Vec<String> =
             session.shader_files().keys().filter(|file| seen.insert((*file).clone())).cloned().collect();
@@ -83,10 +97,17 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
             }
         }
         bar.finish_and_clear();
-        linked.push(linked_row(bench, &mut session, extent_px)?);
+        if needs == NeedsMode::Auto {
+            linked.push(linked_row(bench, &mut session, extent_px)?);
+        }
     }
-    let figures = json!({ "extent_px": extent_px, "rows": rows, "linked": linked });
-    Ok(Measured { figures, tables: vec![table(&rows), linked_table(&linked)] })
+    let is_stage = |file: &String| STAGES.contains(&file.rsplit('.').next().unwrap_or_default());
+    let not_measured = ShaderSources::built_in_files().into_iter().filter(is_stage);
+    let not_measured: Vec<String> =
+        not_measured.filter(|file| rows.iter().all(|row: &Row| row.file != *file)).collect();
+    let figures =
+        json!({ "extent_px": extent_px, "rows": rows, "linked": linked, "not_measured": not_measured });
+    Ok(Measured { figures, tables: vec![table(&rows, &not_measured), linked_table(&linked)] })
 }
 
 /// Frame times of two sessions that show the same, taking turns.
@@ -124,6 +145,8 @@ fn session_of(
         watch_shaders: folder.map(|_| WakeFn(Arc::new(|| ()))),
         settings: settings.clone(),
         extent,
+        // As only then there is a stage that encodes for one.
+        window: settings.needs == NeedsMode::All,
         ..SessionOptions::default()
     };
     let mut session = Session::new(&bench.device, options)?;
@@ -216,7 +239,7 @@ fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
-fn table(rows: &[Row]) -> Table {
+fn table(rows: &[Row], not_measured: &[String]) -> Table {
     let head = [
         "pipeline",
         "file",
@@ -247,6 +270,9 @@ fn table(rows: &[Row]) -> Table {
         "Saved to shown: from before the file is written to the end of the first frame with the new pipelines. Each edit makes \
          another module, which no cache knows. Frame: on the host, two in flight.",
     );
+    if !not_measured.is_empty() {
+        table.note(format!("Not measured: {}.", not_measured.join(", ")));
+    }
     table
 }
 

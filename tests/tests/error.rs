@@ -69,8 +69,9 @@ fn the_device_measures_what_the_host_does() {
         assert_eq!(found.samples, 16);
         let noise = Noise::of(&picture).expect("noise").error();
         let told = found.noise.expect("noise").error();
-        [(told.value, noise.value), (told.low, noise.low), (told.high, noise.high)]
-            .map(|(found, expected)| near(found, expected, "noise"));
+        for (found, expected) in [(told.value, noise.value), (told.low, noise.low), (told.high, noise.high)] {
+            near(found, expected, "noise");
+        }
         let split = Split::of(&reference, &picture, Halves::Streams).expect("a split");
         let [truth, seen] =
             [&*reference, &picture].map(|p| Radiance::new(p.extent, &p.mean).expect("a picture"));
@@ -96,7 +97,7 @@ fn maps_show_where_the_error_is() {
         SessionOptions { shaders: shaders_under_test(), extent: EXTENT, ..SessionOptions::default() };
     let mut session = Session::new(&gpu.device, options).expect("a session");
     open(&mut session, &scene());
-    let mut shown = |session: &mut Session, show| {
+    let shown = |session: &mut Session, show| {
         session.set_settings(ViewSettings { show, ..session.settings().clone() });
         frame(session);
         session.read_display().expect("a display")

@@ -19,7 +19,7 @@ use super::{Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, f
 use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, ShapeSource};
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
-use crate::ids::{MaterialId, MeshId, NodeId, Target};
+use crate::ids::{MaterialId, MeshId, Target};
 use crate::import::{self, ImportError, ImportOptions, Imported, Warning, short};
 use crate::node::{Node, NodeKind, Subtree};
 use crate::package::{MaterialEntry, PrefabPackage, package_with_ids};

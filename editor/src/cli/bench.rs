@@ -7,6 +7,7 @@ mod crowd;
 mod edits;
 mod hybrid;
 mod machine;
+mod motion;
 mod moves;
 mod reload;
 mod rig;
@@ -33,6 +34,7 @@ use super::DeviceArgs;
 use super::render::report_validation;
 use convergence::ConvergenceArgs;
 use hybrid::HybridArgs;
+use motion::MotionArgs;
 use table::Table;
 
 /// A named list of measurements.
@@ -47,7 +49,9 @@ struct Part {
     run: fn(&Bench) -> anyhow::Result<Measured>,
 }
 
-const SUITES: [Suite; 5] = [ACCEL, SHAPES, HYBRID, RELOAD, CONVERGENCE];
+const SUITES: [Suite; 6] = [ACCEL, SHAPES, HYBRID, RELOAD, CONVERGENCE, MOTION];
+
+const MOTION: Suite = Suite { name: "motion", parts: &[Part { name: "memory", run: motion::run }] };
 
 const CONVERGENCE: Suite =
     Suite { name: "convergence", parts: &[Part { name: "samplers", run: convergence::run }] };
@@ -94,6 +98,8 @@ pub(super) struct BenchArgs {
     hybrid: HybridArgs,
     #[command(flatten)]
     convergence: ConvergenceArgs,
+    #[command(flatten)]
+    motion: MotionArgs,
 }
 
 fn names(known: &[&'static str]) -> PossibleValuesParser {
@@ -112,6 +118,7 @@ struct Bench {
     progress: bool,
     hybrid: HybridArgs,
     convergence: ConvergenceArgs,
+    motion: MotionArgs,
 }
 
 impl Bench {
@@ -157,6 +164,7 @@ pub(super) fn run(
         progress,
         hybrid: args.hybrid.clone(),
         convergence: args.convergence.clone(),
+        motion: args.motion.clone(),
     };
     let mut report = head(args, &device);
     // Written after every part: a run that is cut short leaves what it has measured.

@@ -250,6 +250,14 @@ impl Session {
         Ok(self.renderer.read_back(&mut self.frames, self.view)?)
     }
 
+    /// The radiance of the last frame, denoised where that frame was. Waits for the device.
+    ///
+    /// # Errors
+    /// When there is no frame yet or the device is lost.
+    pub fn read_frame(&mut self) -> anyhow::Result<Vec<[f32; 3]>> {
+        Ok(self.renderer.read_frame(&mut self.frames, self.view)?)
+    }
+
     /// The tone-mapped image, linear. Waits for the device.
     ///
     /// # Errors

@@ -86,6 +86,16 @@ impl Split {
     }
 }
 
+impl Accumulated {
+    /// Two pictures that differ in their random numbers alone as the halves of one ([`Halves::Runs`]).
+    pub fn of_runs(extent: [u32; 2], [a, b]: [&[[f32; 3]]; 2]) -> Self {
+        let of = |combine: fn(f32, f32) -> f32| {
+            a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|i| combine(a[i], b[i]))).collect()
+        };
+        Self { extent, samples: 2, mean: of(|a, b| (a + b) * 0.5), half_difference: of(|a, b| (a - b) * 0.5) }
+    }
+}
+
 /// The mean of every pixel, and half of the difference of its halves.
 fn pixels(image: &Accumulated) -> impl Iterator<Item = (&[f32; 3], &[f32; 3])> {
     image.mean.iter().zip(&image.half_difference)

@@ -80,7 +80,9 @@ pub(super) fn measure(
     };
     let exposure = settings.exposure_ev.exp2();
     let compare = |(number, stop): (usize, &Stop)| -> anyhow::Result<Point> {
-        let pair = others.get(number).map(|other| pair(&stop.picture, &other.picture));
+        let pair = others
+            .get(number)
+            .map(|other| Accumulated::of_runs(reference.extent, [&stop.picture.mean, &other.picture.mean]));
         let split = Split::of(reference, pair.as_ref().unwrap_or(&stop.picture), halves)?;
         point(reference, stop, split, exposure, number + 1 == stops.len())
     };
@@ -108,20 +110,6 @@ fn point(
         flip_hdr: if is_last { flip_hdr(&truth, &seen)?.map(|flip| flip.mean) } else { None },
         split,
     })
-}
-
-/// Two runs as halves of one picture.
-fn pair(a: &Accumulated, b: &Accumulated) -> Accumulated {
-    let of = |combine: fn(f32, f32) -> f32| {
-        let pixels = a.mean.iter().zip(&b.mean);
-        pixels.map(|(a, b)| [0, 1, 2].map(|i| combine(a[i], b[i]))).collect()
-    };
-    Accumulated {
-        extent: a.extent,
-        samples: a.samples,
-        mean: of(|a, b| (a + b) * 0.5),
-        half_difference: of(|a, b| (a - b) * 0.5),
-    }
 }
 
 /// Renders from the first sample on and stops at `first`, and whenever there are twice as many.

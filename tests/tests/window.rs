@@ -8,6 +8,7 @@ use std::process::{Child, Stdio};
 use caustica_tests::desktop::{Desktop, wait_for};
 use caustica_tests::models::cube;
 use caustica_tests::program::program;
+use caustica_tests::shader_folder;
 use image::RgbImage;
 
 /// The window: small, for slow devices.
@@ -293,6 +294,52 @@ fn what_a_killed_editor_had_not_saved_is_recovered() {
     again.wait_for("undo to bring the cube back", 90, |desktop| {
         shows_cube(&desktop.screenshot()).then_some(())
     });
+}
+
+/// Texts of shaders that are kept for the next start: the name of the file that holds them, and what it says.
+fn typed(folder: &Path) -> Option<(PathBuf, String)> {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let path = files.into_iter().find(|path| path.extension().is_some_and(|ending| ending == "typed"))?;
+    let kept: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&path).ok()?).ok()?;
+    Some((path, kept["texts"]["lib/fresnel.glsl"].as_str()?.to_owned()))
+}
+
+#[test]
+fn what_is_typed_into_a_shader_outlives_the_end_of_the_editor() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let desktop = Desktop::start([1600, 960]);
+    let journals = desktop.settings().join("caustica/journals");
+    std::fs::create_dir_all(&journals).expect("a folder");
+    let left = journals.join("1-1.typed");
+    let shaders = shader_folder();
+    let texts = serde_json::json!({ "folder": &shaders, "texts": { "lib/fresnel.glsl": "// mine\n" } });
+    std::fs::write(&left, texts.to_string()).expect("a text that was left behind");
+    let arguments = ["--shaders", shaders.to_str().expect("a path")];
+    for end in ["-TERM", "-HUP", "-KILL"] {
+        let mut editor = Editor::start_with(&desktop, folder.path(), &cube(false), &arguments);
+        let log = editor.log.clone();
+        let words = "lib/fresnel.glsl: what was typed and not saved when the program ended is back";
+        let told = || std::fs::read_to_string(&log).unwrap_or_default().contains(words);
+        editor.wait_for("the text to be back", 90, |_| told().then_some(()));
+        let before = editor.wait_for("the text to be kept again", 90, |_| {
+            typed(&journals)
+                .filter(|(path, text)| *path != left && text.contains("// mine"))
+                .map(|(_, text)| text)
+        });
+        // The text is to the right of the files, below the view; it is there once the window has its size.
+        editor.wait_for("what is typed to be kept", 90, |desktop| {
+            desktop.xdotool("mousemove 590 630 sleep 0.5 mousemove 600 630 sleep 1 click 1 sleep 1");
+            desktop.xdotool("type --delay 50 abc");
+            std::thread::sleep(std::time::Duration::from_secs(1));
+            typed(&journals).filter(|(_, text)| *text != before && text.contains("abc"))
+        });
+        let process = editor.process.id().to_string();
+        let sent = std::process::Command::new("kill").args([end, &process]).status();
+        assert!(sent.expect("kill").success());
+        editor.process.wait().expect("the end");
+    }
+    let (_, text) = typed(&journals).expect("it is left behind");
+    assert!(text.contains("// mine") && text.matches("abc").count() >= 3, "{text}");
 }
 
 /// Holds the only journal that there is, as its process does.

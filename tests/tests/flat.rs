@@ -42,8 +42,9 @@ fn picture(session: &mut Session, pipeline: Pipeline, node: &Value) -> Vec<[f32;
 
 /// How many pixels are another.
 fn differing(a: &[[f32; 3]], b: &[[f32; 3]]) -> usize {
-    let is_other =
-        |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|i| !((a[i] - b[i]).abs() <= 0.02 * b[i].abs() + 1e-3));
+    let is_other = |(a, b): (&[f32; 3], &[f32; 3])| {
+        (0..3).any(|i| a[i].is_nan() || (a[i] - b[i]).abs() > 0.02 * b[i].abs() + 1e-3)
+    };
     a.iter().zip(b).filter(|(a, b)| is_other((a, b))).count()
 }
 

@@ -99,6 +99,7 @@ fn studio(folder: &Folder, settings: ViewSettings) -> Studio {
     let mut studio = Studio::editing(folder.0.path(), EXTENT, settings);
     studio.view_mut().set_camera(camera);
     studio.apply(&scene.delta);
+    studio.view_mut().measure();
     studio.frames(2);
     studio
 }
@@ -127,6 +128,7 @@ fn ways() -> Vec<ViewSettings> {
         settings(Pipeline::Raster, Primary::Raster, Show::NonFinite, false),
         settings(Pipeline::Raster, Primary::Raster, Show::Wireframe, false),
         settings(Pipeline::Raster, Primary::Raster, Show::Normal, false),
+        settings(Pipeline::Raster, Primary::Raster, Show::Error, false),
         settings(Pipeline::Path, Primary::Rays, Show::Image, false),
     ]
 }

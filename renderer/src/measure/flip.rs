@@ -2,6 +2,8 @@
 //! Out: the mean difference from 0 to 1, and a map. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images"
 //! (HPG 2020), and "Visualizing Errors in Rendered High Dynamic Range Images" (Eurographics short papers 2021).
 
+use rayon::prelude::*;
+
 use super::error::{LUMINANCE, Radiance, same_size};
 use crate::error::Result;
 
@@ -63,15 +65,19 @@ pub fn flip_hdr(reference: &Radiance<'_>, picture: &Radiance<'_>) -> Result<Opti
     same_size(reference, picture)?;
     let Some((start, stop)) = exposures(reference) else { return Ok(None) };
     let count = (stop - start).ceil().max(2.0);
-    let mut map = vec![0.0_f32; reference.pixels().len()];
-    for step in 0..count as u32 {
+    let of_exposure = |step: u32| {
         let exposure = (start + (stop - start) * step as f32 / (count - 1.0)).exp2();
         let toned = |image: &Radiance<'_>| -> Vec<[f32; 3]> {
             image.pixels().iter().map(|pixel| pixel.map(|c| shown(tone(c.max(0.0) * exposure)))).collect()
         };
-        let one = difference(reference.extent(), &toned(reference), &toned(picture));
-        map.iter_mut().zip(one).for_each(|(most, value)| *most = most.max(value));
-    }
+        difference(reference.extent(), &toned(reference), &toned(picture))
+    };
+    let largest = |mut most: Vec<f32>, other: Vec<f32>| {
+        most.iter_mut().zip(other).for_each(|(most, value)| *most = most.max(value));
+        most
+    };
+    let nothing = || vec![0.0; reference.pixels().len()];
+    let map = (0..count as u32).into_par_iter().map(of_exposure).reduce(nothing, largest);
     Ok(Some(Flip::of_map(map)))
 }
 

@@ -4,9 +4,10 @@ use std::io::Cursor;
 
 use anyhow::Context;
 use caustica_renderer::{Accumulated, Radiance, flip_ldr, relative_error_map};
+use rayon::prelude::*;
 
-use super::Report;
 use super::run::Measured;
+use super::{Report, Row};
 use crate::cli::output::srgb_byte;
 
 /// Decades of the relative error that a map shows, up to 100 %.
@@ -50,7 +51,7 @@ pub(super) fn all(
         image.mean.iter().flatten().map(|value| srgb_byte(value * exposure)).collect()
     };
     let mut images = vec![shown("reference", "reference.png".to_owned(), extent, as_seen(reference))?];
-    for (row, measured) in report.pipelines.iter().zip(measured) {
+    let of_row = |(row, measured): (&Row, &Measured)| -> anyhow::Result<[Shown; 3]> {
         let name = &row.name;
         let [truth, seen] =
             [reference, &measured.picture].map(|image| Radiance::new(image.extent, &image.mean));
@@ -59,10 +60,14 @@ pub(super) fn all(
         let relative = relative.iter().flat_map(|error| magma(error.log10() / DECADES + 1.0));
         let flip = flip_ldr(&truth, &seen, exposure)?.map;
         let flip = flip.iter().flat_map(|difference| magma(*difference));
-        images.push(shown(name, format!("{name}.png"), extent, as_seen(&measured.picture))?);
-        images.push(shown("relative error", format!("{name}-error.png"), extent, relative.collect())?);
-        images.push(shown("FLIP", format!("{name}-flip.png"), extent, flip.collect())?);
-    }
+        Ok([
+            shown(name, format!("{name}.png"), extent, as_seen(&measured.picture))?,
+            shown("relative error", format!("{name}-error.png"), extent, relative.collect())?,
+            shown("FLIP", format!("{name}-flip.png"), extent, flip.collect())?,
+        ])
+    };
+    let rows = report.pipelines.par_iter().zip(measured).map(of_row);
+    images.extend(rows.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten());
     Ok(images)
 }
 

@@ -324,6 +324,12 @@ fn status_figures(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.label(mono(format!("{ms:>7} ms"))).on_hover_text("All passes of a frame on the device");
     let samples = mono(format!("{:6} samples", cx.session.statistics().samples));
     ui.label(samples).on_hover_text("Samples in each pixel of the picture");
+    if let Some(noise) = cx.session.live_error().and_then(|found| found.noise)
+        && !cx.session.settings().denoise_stills
+    {
+        let text = mono(format!("noise {:.2} %", noise.error().value * 100.0));
+        ui.label(text).on_hover_text("What more samples would take away; the Error panel says more");
+    }
     let Some(audit) = &cx.state.health else { return };
     let is_problem = |finding: &&Finding| finding.severity != Severity::Info;
     let problems = audit.findings.iter().filter(is_problem).count();

@@ -23,13 +23,12 @@ const FIGURES_WIDTH: f32 = 330.0;
 
 /// Draws the panel.
 pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let height = ui.available_height();
+    let size = egui::vec2(FIGURES_WIDTH, ui.available_height());
     ui.horizontal_top(|ui| {
-        ui.allocate_ui(egui::vec2(FIGURES_WIDTH, height), |ui| {
+        ui.allocate_ui_with_layout(size, egui::Layout::top_down(egui::Align::Min), |ui| {
             egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                ui.set_max_width(FIGURES_WIDTH - 12.0);
                 figures(cx, ui);
-                ui.separator();
+                ui.add_space(4.0);
                 reference(cx, ui);
                 stop(cx, ui);
                 maps(cx, ui);
@@ -178,7 +177,6 @@ fn plot(cx: &Cx<'_>, ui: &mut Ui) {
     Plot::new("error over time")
         .legend(Legend::default().follow_insertion_order(true))
         .x_axis_label("ms on the device")
-        .y_axis_label("relMSE")
         .x_axis_formatter(|mark, _| power(mark.value))
         .y_axis_formatter(|mark, _| power(mark.value))
         .label_formatter(|at| {

@@ -11,7 +11,9 @@ float mean_of_channels(vec3 value) {
 // Variance of the mean of two streams relative to its brightness, of which a b is the unbiased square. In: the mean, half the difference.
 float relative_variance(vec3 mean, vec3 half_difference) {
     vec3 product = (mean + half_difference) * (mean - half_difference);
-    return mean_of_channels(half_difference * half_difference / (max(product, vec3(0.0)) + RELATIVE_EPSILON));
+    // Where one stream alone has seen what is bright, the product says that the pixel is black.
+    vec3 square = max(product, 0.25 * mean * mean);
+    return mean_of_channels(half_difference * half_difference / (square + RELATIVE_EPSILON));
 }
 
 vec3 reference_weight(vec3 reference) {

@@ -12,6 +12,10 @@ pub(super) const STANDARD_ERRORS: f64 = 1.96;
 /// measured by. It falls as fast as the noise itself (`tests/tests/noise.rs`).
 const SKEW: f64 = 0.5;
 
+/// Where one stream alone has seen what is bright, the product of both says that the pixel is black; its square is taken for at least this part of
+/// the square of the mean.
+const LEAST_SQUARE: f64 = 0.25;
+
 /// A number with the interval that holds the true one in 95 of 100 cases.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
@@ -48,7 +52,7 @@ impl Noise {
             let terms = mean.iter().zip(half).map(|(mean, half)| {
                 let (mean, half) = (f64::from(*mean), f64::from(*half));
                 let product = (mean + half) * (mean - half);
-                half * half / (product.max(0.0) + RELATIVE_EPSILON)
+                half * half / (product.max(mean * mean * LEAST_SQUARE) + RELATIVE_EPSILON)
             });
             terms.sum::<f64>() / 3.0
         });

@@ -244,6 +244,14 @@ fn progress_bar(json: bool) -> ProgressBar {
     bar
 }
 
+/// Shows on a bar how far the reading of a file is.
+fn steps_on(bar: &ProgressBar) -> impl Fn(&str, f32) {
+    move |step: &str, share: f32| {
+        bar.set_message(step.to_owned());
+        bar.set_position((share * 100.0) as u64);
+    }
+}
+
 /// What `say!` does.
 fn say_line(text: std::fmt::Arguments<'_>) {
     use std::io::Write;

@@ -19,7 +19,7 @@ pub(super) use args::RenderArgs;
 use args::{settings_of, without_effect};
 
 use super::output::{self, Kind, Metadata};
-use super::{DeviceArgs, progress_bar};
+use super::{DeviceArgs, progress_bar, steps_on};
 use crate::session::{Loaded, Session, SessionOptions};
 
 /// Frames of which the times are kept for the median.
@@ -59,10 +59,7 @@ pub(super) fn run(
     let start = Instant::now();
     let progress = progress_bar(args.json);
     progress.set_message("loading");
-    let loaded = args.shot.load(&|step, share| {
-        progress.set_message(step.to_owned());
-        progress.set_position((share * 100.0) as u64);
-    })?;
+    let loaded = args.shot.load(&steps_on(&progress))?;
     let device = device.open()?;
     let _watch = DeviceArgs::watch(&device);
     let mut session = Session::new(

@@ -19,7 +19,7 @@ use serde::Serialize;
 use self::choice::Choice;
 use self::run::{Measured, Until};
 use super::shot::{ShotArgs, parse_positive};
-use super::{DeviceArgs, progress_bar};
+use super::{DeviceArgs, progress_bar, steps_on};
 use crate::curve::Curve;
 use crate::reference::{self, Kept};
 use crate::session::{Session, SessionOptions};
@@ -124,10 +124,7 @@ pub(super) fn run(
     }
     let progress = progress_bar(args.json);
     progress.set_message("loading");
-    let loaded = args.shot.load(&|step, share| {
-        progress.set_message(step.to_owned());
-        progress.set_position((share * 100.0) as u64);
-    })?;
+    let loaded = args.shot.load(&steps_on(&progress))?;
     // Found out before the work, not after it.
     std::fs::create_dir_all(&args.output).with_context(|| args.output.display().to_string())?;
     let device = device.open()?;

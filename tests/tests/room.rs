@@ -114,7 +114,10 @@ fn meshes_that_cannot_fit_are_refused_in_words_before_they_are_taken_in() {
     let mut session = Session::new(&gpu.device, options).expect("a session");
     import(&mut session, &plane).expect("one could fit");
     let before = session.document().clone();
-    let refused = import(&mut session, &plane).expect_err("two cannot");
+    // The same file once more would be another instance, which takes no room.
+    let other = folder.path().join("other.obj");
+    std::fs::copy(&plane, &other).expect("a copy");
+    let refused = import(&mut session, &other).expect_err("two cannot");
     println!("{refused}");
     assert!(
         refused.contains("the meshes of the scene take at least 19.") && refused.contains("there are 14;"),

@@ -31,12 +31,9 @@ pub fn settings_of_truth(settings: &ViewSettings) -> ViewSettings {
         // The truth knows no limit, and reflects light as often as surfaces do as glTF describes them.
         path_depth: None,
         multiple_scattering: settings.multiple_scattering,
-        denoise_stills: false,
-        temporal: false,
-        spatial: false,
-        jitter: true,
         ..ViewSettings::default()
     }
+    .for_still(false, false)
 }
 
 /// Where the reference of a scene is kept, and what it depends on.

@@ -84,7 +84,8 @@ pub struct Session {
     profile: ProfileInForce,
     tally: Tally,
     host_times: HostTimes,
-    measuring: measuring::Measuring,
+    /// No more samples once the error is so small, as a share: 0.01 is 1 %.
+    stop_at: Option<f64>,
     device: Arc<Device>,
 }
 
@@ -136,7 +137,7 @@ impl Session {
             profile,
             tally: Tally::default(),
             host_times: HostTimes::default(),
-            measuring: measuring::Measuring::default(),
+            stop_at: None,
             device: Arc::clone(device),
         })
     }

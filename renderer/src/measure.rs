@@ -2,7 +2,7 @@
 
 mod accel_bench;
 mod device_profile;
-pub(crate) mod error;
+mod error;
 mod flip;
 mod live;
 mod noise;

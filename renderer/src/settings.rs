@@ -215,6 +215,15 @@ pub struct ViewSettings {
     pub jitter: bool,
 }
 
+impl ViewSettings {
+    /// These for a still: denoised over its frames, each with all of those before it as its past, and over space too; or not.
+    #[must_use]
+    pub fn for_still(self, temporal: bool, spatial: bool) -> Self {
+        let temporal_max_history = if temporal { f32::MAX } else { self.temporal_max_history };
+        Self { temporal, spatial, denoise_stills: temporal, temporal_max_history, ..self }
+    }
+}
+
 impl Default for ViewSettings {
     fn default() -> Self {
         Self {

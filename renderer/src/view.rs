@@ -221,6 +221,11 @@ impl View {
         self.measuring.set_reference(reference);
     }
 
+    /// Whether there is something that the picture is compared with.
+    pub fn has_reference(&self) -> bool {
+        self.measuring.has_reference()
+    }
+
     /// Asks for the error of the picture with its next sample; it is in [`Statistics::error`] some frames later.
     pub fn measure(&mut self) {
         self.measuring.wanted = true;

@@ -35,6 +35,7 @@ use super::render::report_validation;
 use convergence::ConvergenceArgs;
 use hybrid::HybridArgs;
 use motion::MotionArgs;
+pub(super) use series::Series;
 use table::Table;
 
 /// A named list of measurements.

@@ -188,8 +188,7 @@ fn accumulate(session: &mut Session, args: &RenderArgs, progress: &ProgressBar) 
     let mut done = 0;
     let mut can_be_read = false;
     while (done < samples || session.textures_settle()) && in_time(done) {
-        let recorder = session.begin_frame(args.shot.size)?;
-        session.submit(recorder, None)?;
+        session.render_frame(args.shot.size)?;
         let times = &session.statistics().passes;
         if frames.len() < TIMED_FRAMES && !times.is_empty() {
             frames.push(times.clone());

@@ -115,7 +115,7 @@ fn reference(cx: &mut Cx<'_>, ui: &mut Ui) {
         return;
     }
     ui.horizontal(|ui| {
-        let has_one = cx.session.reference().is_some();
+        let has_one = cx.session.has_reference();
         let words = if has_one { "Again" } else { "Render a reference" };
         let tip =
             "Shows the path tracer's picture until it has so many samples, and compares with it from then on";
@@ -159,7 +159,7 @@ fn stop(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn maps(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let shown = cx.session.settings().show;
-        let has_reference = cx.session.reference().is_some();
+        let has_reference = cx.session.has_reference();
         for (show, name, enabled) in
             [(Show::Noise, "Noise map", true), (Show::Error, "Error map", has_reference)]
         {

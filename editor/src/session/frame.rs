@@ -154,6 +154,15 @@ impl Session {
         Ok(())
     }
 
+    /// Renders one frame without a window and does not wait for it.
+    ///
+    /// # Errors
+    /// As [`Self::begin_frame`] and [`Self::submit`].
+    pub fn render_frame(&mut self, extent_px: [u32; 2]) -> anyhow::Result<()> {
+        let recorder = self.begin_frame(extent_px)?;
+        self.submit(recorder, None)
+    }
+
     /// Waits for everything submitted and takes the newest times over.
     ///
     /// # Errors

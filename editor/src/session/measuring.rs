@@ -7,14 +7,6 @@ use caustica_renderer::{Accumulated, LiveError};
 
 use super::Session;
 
-/// What a session knows of the error of its picture.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Measuring {
-    reference: Option<Arc<Accumulated>>,
-    /// No more samples once the error is so small, as a share: 0.01 is 1 %.
-    stop_at: Option<f64>,
-}
-
 impl Session {
     /// Asks for the error of the picture with its next sample.
     pub fn measure(&mut self) {
@@ -31,15 +23,14 @@ impl Session {
 
     /// What the picture is compared with, where it has the same size.
     pub fn set_reference(&mut self, reference: Option<Arc<Accumulated>>) {
-        self.measuring.reference.clone_from(&reference);
         if let Ok(view) = self.renderer.view_mut(self.view) {
             view.set_reference(reference);
         }
     }
 
-    /// What the picture is compared with.
-    pub fn reference(&self) -> Option<&Arc<Accumulated>> {
-        self.measuring.reference.as_ref()
+    /// Whether there is something that the picture is compared with.
+    pub fn has_reference(&self) -> bool {
+        self.renderer.view(self.view).is_ok_and(|view| view.has_reference())
     }
 
     /// Size of the picture as it is rendered, pixels.
@@ -49,17 +40,17 @@ impl Session {
 
     /// Takes no more samples once the noise, or the error where there is a reference, is so small; 0.01 is 1 %.
     pub fn set_stop_at(&mut self, error: Option<f64>) {
-        self.measuring.stop_at = error;
+        self.stop_at = error;
     }
 
     /// The error at which no more samples are taken.
     pub fn stop_at(&self) -> Option<f64> {
-        self.measuring.stop_at
+        self.stop_at
     }
 
     /// Whether the picture is as good as was asked for.
     pub(super) fn is_good_enough(&self) -> bool {
-        let (Some(target), Some(error)) = (self.measuring.stop_at, self.live_error()) else { return false };
+        let (Some(target), Some(error)) = (self.stop_at, self.live_error()) else { return false };
         let found = error.against.map(|against| against.split.total);
         found.or_else(|| Some(error.noise?.error().value)).is_some_and(|found| found <= target)
     }

@@ -177,8 +177,7 @@ impl Session {
         view.set_divisor(divisor);
         view.let_go();
         self.resync = true;
-        let recorder = self.begin_frame(extent_px)?;
-        self.submit(recorder, None)?;
+        self.render_frame(extent_px)?;
         self.read_back()
     }
 

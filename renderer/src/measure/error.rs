@@ -12,7 +12,7 @@ const TRIMMED_SHARE: f64 = 0.001;
 /// Side of the blocks whose means are compared: what is left there is mostly bias, pixels.
 pub(super) const BLOCK: usize = 8;
 /// Luminance of linear Rec.709.
-pub(crate) const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Linear Rec.709 radiance, row by row from the top.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +91,7 @@ impl ErrorMetrics {
     /// # Errors
     /// When their sizes differ.
     pub fn of(reference: &Radiance<'_>, picture: &Radiance<'_>) -> Result<Self> {
-        same_size(reference, picture)?;
+        same_size(reference.extent, picture.extent)?;
         let pairs = || reference.pixels.iter().zip(picture.pixels).map(|(r, x)| (finite(*r), finite(*x)));
         let [rmse, rmse_trimmed] = means(pairs().map(|(r, x)| squared(r, x, |_| 1.0))).map(f64::sqrt);
         let [rel_mse, rel_mse_trimmed] = means(pairs().map(|(r, x)| squared(r, x, relative)));
@@ -103,8 +103,6 @@ impl ErrorMetrics {
             .collect();
         let [expected, found] = [reference, picture]
             .map(|image| image.pixels.iter().fold([0.0; 3], |sum, pixel| add(sum, finite(*pixel))));
-        let luminance =
-            |sums: [f64; 3]| sums.iter().zip(LUMINANCE).map(|(sum, weight)| sum * weight).sum::<f64>();
         Ok(Self {
             rmse,
             rmse_trimmed,
@@ -124,23 +122,27 @@ impl ErrorMetrics {
 /// # Errors
 /// When the sizes differ.
 pub fn relative_error_map(reference: &Radiance<'_>, picture: &Radiance<'_>) -> Result<Vec<f32>> {
-    same_size(reference, picture)?;
+    same_size(reference.extent, picture.extent)?;
     let pairs = reference.pixels.iter().zip(picture.pixels);
     Ok(pairs.map(|(r, x)| squared(finite(*r), finite(*x), relative).sqrt() as f32).collect())
 }
 
-pub(super) fn same_size(reference: &Radiance<'_>, picture: &Radiance<'_>) -> Result<()> {
-    match reference.extent == picture.extent {
+pub(super) fn same_size(reference: [u32; 2], picture: [u32; 2]) -> Result<()> {
+    match reference == picture {
         true => Ok(()),
         false => {
-            let ([rw, rh], [w, h]) = (reference.extent, picture.extent);
+            let ([rw, rh], [w, h]) = (reference, picture);
             Err(RendererError::Picture(format!("the picture is {w} x {h}, the reference {rw} x {rh}")))
         }
     }
 }
 
+pub(super) fn luminance(rgb: [f64; 3]) -> f64 {
+    rgb.iter().zip(LUMINANCE).map(|(channel, weight)| channel * weight).sum()
+}
+
 /// Weight of a squared difference where the reference is `r`.
-fn relative(r: f64) -> f64 {
+pub(super) fn relative(r: f64) -> f64 {
     (r * r + RELATIVE_EPSILON).recip()
 }
 

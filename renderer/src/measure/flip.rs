@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::error::{LUMINANCE, Radiance, same_size};
+use super::error::{self, Radiance, same_size};
 use crate::error::Result;
 
 mod color;
@@ -49,7 +49,7 @@ impl Flip {
 /// # Errors
 /// When their sizes differ.
 pub fn flip_ldr(reference: &Radiance<'_>, picture: &Radiance<'_>, exposure: f32) -> Result<Flip> {
-    same_size(reference, picture)?;
+    same_size(reference.extent(), picture.extent())?;
     let shown = |image: &Radiance<'_>| -> Vec<[f32; 3]> {
         image.pixels().iter().map(|pixel| pixel.map(|c| shown(c * exposure))).collect()
     };
@@ -62,7 +62,7 @@ pub fn flip_ldr(reference: &Radiance<'_>, picture: &Radiance<'_>, exposure: f32)
 /// # Errors
 /// When their sizes differ.
 pub fn flip_hdr(reference: &Radiance<'_>, picture: &Radiance<'_>) -> Result<Option<Flip>> {
-    same_size(reference, picture)?;
+    same_size(reference.extent(), picture.extent())?;
     let Some((start, stop)) = exposures(reference) else { return Ok(None) };
     let count = (stop - start).ceil().max(2.0);
     let of_exposure = |step: u32| {
@@ -94,8 +94,7 @@ fn tone(x: f32) -> f32 {
 /// Base-2 logarithms of the first and the last exposure.
 fn exposures(reference: &Radiance<'_>) -> Option<(f32, f32)> {
     let luminance = |pixel: &[f32; 3]| -> f32 {
-        let terms = pixel.iter().zip(LUMINANCE).map(|(c, weight)| f64::from(*c) * weight);
-        let sum: f64 = terms.sum();
+        let sum = error::luminance(pixel.map(f64::from));
         if sum.is_finite() { sum.max(0.0) as f32 } else { 0.0 }
     };
     let mut values: Vec<f32> = reference.pixels().iter().map(luminance).collect();

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
+use super::error::luminance;
 use super::noise::Noise;
 use super::split::Split;
 use crate::gpu_types::{ERROR_BLOCK_SIDE, ErrorBlock};
-use crate::measure::error::LUMINANCE;
 
 /// The error of a view's picture, measured on the device while it is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -54,7 +54,6 @@ impl LiveError {
                 blocks.iter().map(of).fold([0.0; 3], |all, one| [0, 1, 2].map(|i| all[i] + f64::from(one[i])))
             };
             let (found, expected) = (sums(|b| b.sum), sums(|b| b.reference_sum));
-            let luminance = |sums: [f64; 3]| sums.iter().zip(LUMINANCE).map(|(sum, w)| sum * w).sum::<f64>();
             let whole = extent.map(|side| f64::from(side / ERROR_BLOCK_SIDE)).iter().product::<f64>();
             let bias: Vec<f64> = blocks.iter().map(|block| f64::from(block.bias)).collect();
             Against {

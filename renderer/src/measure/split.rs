@@ -3,9 +3,9 @@
 
 use serde::Serialize;
 
-use super::error::{BLOCK, RELATIVE_EPSILON};
+use super::error::{BLOCK, relative, same_size};
 use super::noise::{Estimate, STANDARD_ERRORS};
-use crate::error::{RendererError, Result};
+use crate::error::Result;
 use crate::renderer::Accumulated;
 
 /// What the two halves of a picture are.
@@ -38,12 +38,7 @@ impl Split {
     /// # Errors
     /// When the sizes differ.
     pub fn of(reference: &Accumulated, picture: &Accumulated, halves: Halves) -> Result<Self> {
-        if reference.extent != picture.extent {
-            let ([rw, rh], [w, h]) = (reference.extent, picture.extent);
-            return Err(RendererError::Picture(format!(
-                "the picture is {w} x {h}, the reference {rw} x {rh}"
-            )));
-        }
+        same_size(reference.extent, picture.extent)?;
         let width = picture.extent[0] as usize;
         let columns = width.div_ceil(BLOCK);
         // Neighbours err together where light was filtered: the spread is that of blocks.
@@ -52,7 +47,7 @@ impl Split {
         for (at, ((x, d), (r, e))) in pixels(picture).zip(pixels(reference)).enumerate() {
             let terms = |i: usize| {
                 let (x, d, r, e) = (f64::from(x[i]), f64::from(d[i]), f64::from(r[i]), f64::from(e[i]));
-                let weight = (r * r + RELATIVE_EPSILON).recip() / 3.0;
+                let weight = relative(r) / 3.0;
                 let variance = if halves == Halves::Streams { d * d } else { 2.0 * d * d };
                 let product = (x + d - r) * (x - d - r);
                 [

@@ -48,6 +48,10 @@ impl Measuring {
         self.reference_revision += 1;
     }
 
+    pub(crate) fn has_reference(&self) -> bool {
+        self.reference.is_some()
+    }
+
     /// Brings what is needed for a picture of this size to the device.
     pub(crate) fn prepare(
         &mut self,

@@ -140,8 +140,7 @@ fn row(bench: &Bench, count: u32) -> anyhow::Result<Row> {
 
 /// Renders one frame and waits for it.
 fn frame(session: &mut Session, extent_px: [u32; 2]) -> anyhow::Result<()> {
-    let recorder = session.begin_frame(extent_px)?;
-    session.submit(recorder, None)?;
+    session.render_frame(extent_px)?;
     session.finish()
 }
 

@@ -23,9 +23,6 @@ const REFERENCE: u64 = 16;
 const REFERENCE_SEED: u32 = u32::MAX;
 const SCENE: &str = "tests/references/cornell-diffuse-f0.gltf";
 
-const SAMPLERS: [Sampler; 5] =
-    [Sampler::Independent, Sampler::Sobol, Sampler::Halton, Sampler::Hammersley, Sampler::BlueNoise];
-
 /// Arguments of suite `convergence`.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Suite convergence")]
@@ -59,7 +56,7 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
     let options =
         SessionOptions { shaders: bench.shaders.clone(), extent: EXTENT, ..SessionOptions::default() };
     let mut session = Session::new(&bench.device, options)?;
-    let bar = bench.bar("convergence", args.scenes.len() * SAMPLERS.len() * seeds as usize);
+    let bar = bench.bar("convergence", args.scenes.len() * Sampler::ALL.len() * seeds as usize);
     let mut rows = Vec::new();
     for scene in &args.scenes {
         bar.set_message(scene.display().to_string());
@@ -82,7 +79,7 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
             },
         )?;
         let reference = reference.as_ref().context("no reference")?;
-        for sampler in SAMPLERS {
+        for sampler in Sampler::ALL {
             let mut sums: Vec<(u64, f64)> = Vec::new();
             for seed in 1..=seeds {
                 let mut step = 0;
@@ -119,8 +116,7 @@ fn render(
     session.set_sample_offset(0)?;
     let (mut next, mut done) = (1, 0);
     while done < most {
-        let recorder = session.begin_frame(EXTENT)?;
-        session.submit(recorder, None)?;
+        session.render_frame(EXTENT)?;
         done = session.samples();
         if done == next && !session.textures_settle() {
             look(done, session.read_back()?)?;

@@ -196,8 +196,7 @@ fn time_frames(
     tally: &mut Tally,
 ) -> anyhow::Result<()> {
     for frame in 0..frames + LATE {
-        let recorder = session.begin_frame(extent_px)?;
-        session.submit(recorder, None)?;
+        session.render_frame(extent_px)?;
         if frame >= LATE {
             tally.take(session);
         }
@@ -209,8 +208,7 @@ fn time_frames(
 fn picture(session: &mut Session, extent_px: [u32; 2], samples: u32) -> anyhow::Result<Picture> {
     let mut first = 0;
     for frame in 0..samples {
-        let recorder = session.begin_frame(extent_px)?;
-        session.submit(recorder, None)?;
+        session.render_frame(extent_px)?;
         if frame == 0 {
             // Counts are those of the last frame only after everything was read.
             session.read_back()?;

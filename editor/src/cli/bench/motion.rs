@@ -154,8 +154,7 @@ fn moments(session: &Session, orbit_deg: f64, count: usize) -> Vec<Moment> {
 fn show(session: &mut Session, moment: &Moment, extent: [u32; 2]) -> anyhow::Result<()> {
     session.set_time(moment.time_s);
     session.set_camera(moment.camera);
-    let recorder = session.begin_frame(extent)?;
-    session.submit(recorder, None)
+    session.render_frame(extent)
 }
 
 /// What a moment looks like when it lasts.

@@ -118,7 +118,7 @@ fn linked_row(bench: &Bench, linked: &mut Session, extent_px: [u32; 2]) -> anyho
     for _ in 0..if bench.quick { 1 } else { 5 } {
         for (session, series) in [(&mut whole, &mut at_once), (&mut *linked, &mut of_groups)] {
             for index in 0..STILL_FRAMES {
-                frame(session, extent_px)?;
+                session.render_frame(extent_px)?;
                 // The first ones tell of frames before.
                 if index >= 4 {
                     series.push(passes_ms(&session.statistics().passes, &[""]));
@@ -155,16 +155,10 @@ fn session_of(
     session.open(project, loaded)?;
     session.set_settings(settings.clone());
     for _ in 0..STILL_FRAMES {
-        frame(&mut session, extent)?;
+        session.render_frame(extent)?;
     }
     session.finish()?;
     Ok(session)
-}
-
-/// One frame without waiting for it.
-fn frame(session: &mut Session, extent_px: [u32; 2]) -> anyhow::Result<()> {
-    let recorder = session.begin_frame(extent_px)?;
-    session.submit(recorder, None)
 }
 
 fn row(
@@ -185,7 +179,7 @@ fn row(
     for edit in 0..edits {
         for _ in 0..STILL_FRAMES / edits.max(1) as usize + 1 {
             let start = Instant::now();
-            frame(session, extent_px)?;
+            session.render_frame(extent_px)?;
             still.push(ms_since(start));
         }
         // A variable that nothing reads: the same picture from another module, so that no cache of the driver knows it.
@@ -196,7 +190,7 @@ fn row(
         std::fs::write(&path, edited)?;
         loop {
             let start = Instant::now();
-            frame(session, extent_px)?;
+            session.render_frame(extent_px)?;
             let status = session.shader_status();
             if status.reloads > before {
                 session.finish()?;
@@ -220,7 +214,7 @@ fn row(
     std::fs::write(&path, &text)?;
     let saved = Instant::now();
     while session.shader_status().reloads == before && saved.elapsed() < PATIENCE {
-        frame(session, extent_px)?;
+        session.render_frame(extent_px)?;
     }
     Ok(Some(Row {
         pipeline: session.settings().pipeline.name(),

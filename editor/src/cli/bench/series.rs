@@ -6,21 +6,21 @@ use super::table::figure;
 
 /// What was measured again and again.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Series(Vec<f64>);
+pub(in crate::cli) struct Series(Vec<f64>);
 
 /// Median and 95th percentile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub(super) struct Spread {
-    pub(super) median: f64,
+pub(in crate::cli) struct Spread {
+    pub(in crate::cli) median: f64,
     pub(super) p95: f64,
 }
 
 impl Series {
-    pub(super) fn push(&mut self, value: f64) {
+    pub(in crate::cli) fn push(&mut self, value: f64) {
         self.0.push(value);
     }
 
-    pub(super) fn spread(&self) -> Spread {
+    pub(in crate::cli) fn spread(&self) -> Spread {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);
         let at = |share: f64| {

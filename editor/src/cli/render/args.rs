@@ -257,11 +257,7 @@ pub(super) fn settings_of(args: &RenderArgs, of_project: ViewSettings) -> ViewSe
         path_depth: args.max_depth.or(of_project.path_depth),
         multiple_scattering: args.multiple_scattering || of_project.multiple_scattering,
         shadow_rays: args.shadow_rays.unwrap_or(of_project.shadow_rays),
-        temporal: args.denoises(),
-        spatial: args.denoise == Some(DenoiseArg::Full),
-        denoise_stills: args.denoises(),
-        // A still keeps all of its frames.
-        temporal_max_history: if args.denoises() { f32::MAX } else { of_project.temporal_max_history },
         ..of_project
     }
+    .for_still(args.denoises(), args.denoise == Some(DenoiseArg::Full))
 }

@@ -10,6 +10,7 @@ pub(super) struct Choice {
     pub(super) name: String,
     pipeline: Pipeline,
     changes: Vec<Change>,
+    sampler: Option<Sampler>,
 }
 
 /// One setting.
@@ -20,7 +21,7 @@ struct Change {
     set: fn(&mut ViewSettings),
 }
 
-const CHANGES: [Change; 14] = [
+const CHANGES: [Change; 9] = [
     Change { name: "denoise", meaning: "denoised over the frames and over space", set: |s| denoise(s, true) },
     Change { name: "temporal", meaning: "denoised over the frames alone", set: |s| denoise(s, false) },
     Change {
@@ -58,31 +59,18 @@ const CHANGES: [Change; 14] = [
         meaning: "path: rough surfaces reflect light that they scatter more than once",
         set: |s| s.multiple_scattering = true,
     },
-    Change { name: "sobol", meaning: "sampler", set: |s| s.sampler = Sampler::Sobol },
-    Change { name: "halton", meaning: "sampler", set: |s| s.sampler = Sampler::Halton },
-    Change { name: "hammersley", meaning: "sampler", set: |s| s.sampler = Sampler::Hammersley },
-    Change { name: "independent", meaning: "sampler", set: |s| s.sampler = Sampler::Independent },
-    Change { name: "blue-noise", meaning: "sampler", set: |s| s.sampler = Sampler::BlueNoise },
 ];
 
-const PIPELINES: [Pipeline; 4] = [Pipeline::Raster, Pipeline::Hybrid, Pipeline::Raytraced, Pipeline::Path];
-
 fn denoise(settings: &mut ViewSettings, spatial: bool) {
-    (settings.temporal, settings.spatial, settings.denoise_stills) = (true, spatial, true);
-    // A still keeps all of its frames.
-    settings.temporal_max_history = f32::MAX;
+    *settings = settings.clone().for_still(true, spatial);
 }
 
 impl Choice {
     /// The settings, on top of those of the file.
     pub(super) fn settings(&self, of_file: &ViewSettings) -> ViewSettings {
-        let mut settings = ViewSettings {
-            pipeline: self.pipeline,
-            temporal: false,
-            spatial: false,
-            denoise_stills: false,
-            ..of_file.clone()
-        };
+        let sampler = self.sampler.unwrap_or(of_file.sampler);
+        let mut settings =
+            ViewSettings { pipeline: self.pipeline, sampler, ..of_file.clone() }.for_still(false, false);
         self.changes.iter().for_each(|change| (change.set)(&mut settings));
         settings
     }
@@ -94,26 +82,36 @@ impl FromStr for Choice {
     fn from_str(text: &str) -> Result<Self, String> {
         let mut parts = text.split('+').map(str::trim);
         let first = parts.next().unwrap_or_default();
-        let pipeline = PIPELINES.into_iter().find(|pipeline| pipeline.name() == first).ok_or_else(|| {
-            format!("no pipeline '{first}'; there is: {}", PIPELINES.map(Pipeline::name).join(", "))
-        })?;
-        let known = |part: &str| {
-            CHANGES.into_iter().find(|change| change.name == part).ok_or_else(|| {
-                format!("no setting '{part}'; there is: {}", CHANGES.map(|change| change.name).join(", "))
-            })
-        };
-        let changes = parts.map(known).collect::<Result<_, _>>()?;
-        Ok(Self { name: text.trim().to_owned(), pipeline, changes })
+        let pipeline =
+            Pipeline::ALL.into_iter().find(|pipeline| pipeline.name() == first).ok_or_else(|| {
+                format!("no pipeline '{first}'; there is: {}", Pipeline::ALL.map(Pipeline::name).join(", "))
+            })?;
+        let mut choice = Self { name: text.trim().to_owned(), pipeline, changes: Vec::new(), sampler: None };
+        for part in parts {
+            let sampler = Sampler::ALL.into_iter().find(|sampler| sampler.name() == part);
+            match (CHANGES.into_iter().find(|change| change.name == part), sampler) {
+                (Some(change), _) => choice.changes.push(change),
+                (None, Some(sampler)) => choice.sampler = Some(sampler),
+                (None, None) => {
+                    let known = CHANGES.map(|change| change.name).into_iter();
+                    let known: Vec<&str> = known.chain(Sampler::ALL.map(Sampler::name)).collect();
+                    return Err(format!("no setting '{part}'; there is: {}", known.join(", ")));
+                }
+            }
+        }
+        Ok(choice)
     }
 }
 
 /// Says what there is.
 pub(super) fn help() -> String {
-    let lines = CHANGES.map(|change| format!("  +{:20} {}", change.name, change.meaning));
+    let changes = CHANGES.map(|change| (change.name, change.meaning));
+    let samplers = Sampler::ALL.map(|sampler| (sampler.name(), "sampler"));
+    let lines = changes.into_iter().chain(samplers).map(|(name, meaning)| format!("  +{name:20} {meaning}"));
     format!(
         "What is compared: of {}, each with settings after a '+', as in hybrid+denoise+half:\n{}",
-        PIPELINES.map(Pipeline::name).join(", "),
-        lines.join("\n")
+        Pipeline::ALL.map(Pipeline::name).join(", "),
+        lines.collect::<Vec<_>>().join("\n")
     )
 }
 

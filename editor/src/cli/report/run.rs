@@ -8,6 +8,7 @@ use caustica_renderer::{
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
+use crate::cli::bench::Series;
 use crate::curve::{Curve, Point};
 use crate::reference::settings_of_truth;
 use crate::session::Session;
@@ -50,7 +51,7 @@ pub(super) fn reference(
     begin(session, &settings, extent)?;
     progress.set_length(samples);
     while session.samples() < samples {
-        frame(session, extent)?;
+        session.render_frame(extent)?;
         progress.set_position(session.samples());
     }
     session.read_back()
@@ -128,7 +129,7 @@ fn run(
     loop {
         let start = Instant::now();
         while session.samples() < next {
-            frame(session, extent)?;
+            session.render_frame(extent)?;
             progress.set_position(session.samples());
         }
         session.finish()?;
@@ -147,7 +148,7 @@ fn run(
 fn begin(session: &mut Session, settings: &ViewSettings, extent: [u32; 2]) -> anyhow::Result<()> {
     session.set_settings(settings.clone());
     loop {
-        frame(session, extent)?;
+        session.render_frame(extent)?;
         session.finish()?;
         if !session.textures_settle() && !session.builds_in_background() {
             break;
@@ -157,11 +158,6 @@ fn begin(session: &mut Session, settings: &ViewSettings, extent: [u32; 2]) -> an
     session.set_sample_offset(0)
 }
 
-fn frame(session: &mut Session, extent: [u32; 2]) -> anyhow::Result<()> {
-    let recorder = session.begin_frame(extent)?;
-    session.submit(recorder, None)
-}
-
 /// Median milliseconds of a sample of each, in turns.
 pub(super) fn ms_per_sample(
     session: &mut Session,
@@ -169,24 +165,19 @@ pub(super) fn ms_per_sample(
     extent: [u32; 2],
     progress: &ProgressBar,
 ) -> anyhow::Result<Vec<f64>> {
-    let mut times = vec![Vec::new(); all.len()];
+    let mut times = vec![Series::default(); all.len()];
     progress.set_length(ROUNDS as u64);
     for _ in 0..ROUNDS {
         for (settings, times) in all.iter().zip(&mut times) {
             begin(session, settings, extent)?;
             let (start, before_ms) = (Instant::now(), session.total_device_ms());
             while session.samples() == 0 || start.elapsed() < TURN {
-                frame(session, extent)?;
+                session.render_frame(extent)?;
             }
             session.finish()?;
             times.push((session.total_device_ms() - before_ms) / session.samples() as f64);
         }
         progress.inc(1);
     }
-    Ok(times.into_iter().map(middle).collect())
-}
-
-fn middle(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    Ok(times.iter().map(|times| times.spread().median).collect())
 }

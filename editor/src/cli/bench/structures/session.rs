@@ -164,8 +164,7 @@ impl One {
     }
 
     fn frame(&mut self) -> anyhow::Result<()> {
-        let recorder = self.session.begin_frame(EXTENT)?;
-        self.session.submit(recorder, None)?;
+        self.session.render_frame(EXTENT)?;
         self.session.finish()
     }
 

@@ -323,8 +323,7 @@ impl Session {
         if let Some(settings) = settings {
             self.set_settings(settings);
         }
-        self.camera =
-            camera.unwrap_or_else(|| ViewCamera::of_document(&self.scene.document, None, self.aspect()));
+        self.camera = camera.unwrap_or_else(|| ViewCamera::of_document(&self.scene.document, self.aspect()));
         self.set_time(time_s);
         if camera.is_none()
             && let Some(camera) = self.scene.document.main_camera()
@@ -381,7 +380,7 @@ impl Session {
         self.push_with_room(brought.edit)?;
         self.scene.keep_of(&brought.kept, Some);
         if was_empty {
-            self.camera = ViewCamera::of_document(&self.scene.document, None, self.aspect());
+            self.camera = ViewCamera::of_document(&self.scene.document, self.aspect());
         }
         Ok(Arrived { node: brought.node, changed: brought.changed })
     }

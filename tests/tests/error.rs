@@ -21,7 +21,7 @@ fn scene() -> PathBuf {
 fn open(session: &mut Session, path: &Path) {
     let loaded = load(path, true, &|_, _| ()).expect("the scene loads");
     session.open(path, loaded).expect("the scene opens");
-    session.set_camera(ViewCamera::of_document(session.document(), None, 1.0));
+    session.set_camera(ViewCamera::of_document(session.document(), 1.0));
 }
 
 fn frame(session: &mut Session) {

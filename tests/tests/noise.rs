@@ -77,7 +77,7 @@ fn the_interval_holds_the_error_as_often_as_it_says() {
     for scene in scenes(asked.is_some()) {
         let loaded = load(&scene, true, &|_, _| ()).expect("the scene loads");
         session.open(&scene, loaded).expect("the scene opens");
-        session.set_camera(ViewCamera::of_document(session.document(), None, 1.0));
+        session.set_camera(ViewCamera::of_document(session.document(), 1.0));
         let images: Vec<Accumulated> = (1..=seeds).map(|seed| render(&mut session, seed)).collect();
         let (covered, told, error) = covered(&images);
         println!(

@@ -64,19 +64,14 @@ impl ShotArgs {
         if let Some(name) = &self.scene {
             choose_scene(session, name).with_context(|| self.file.display().to_string())?;
             let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
-            session.set_camera(ViewCamera::of_document(session.document(), None, aspect));
+            session.set_camera(ViewCamera::of_document(session.document(), aspect));
         }
         if let Some(name) = &self.variant {
             choose_variant(session, name).with_context(|| self.file.display().to_string())?;
         }
         if let Some(name) = &self.camera {
-            if session.document().find_camera(name).is_none() {
-                let known = session.document().camera_names();
-                let known =
-                    if known.is_empty() { String::from("the file has none") } else { known.join(", ") };
-                bail!("{}: no camera '{name}'; there is: {known}", self.file.display());
-            }
-            session.set_camera(ViewCamera::of_document(session.document(), Some(name), 1.0));
+            let camera = ViewCamera::named(session.document(), name);
+            session.set_camera(camera.with_context(|| self.file.display().to_string())?);
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! The camera of a view: in double precision, free of the document's cameras once it was placed.
 
+use anyhow::bail;
 use caustica_scene::{Document, Placed, Projection, rigid};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -43,11 +44,22 @@ impl ViewCamera {
         }
     }
 
-    /// The named camera, else the document's main one, else one that frames everything in an image of width / height
-    /// `aspect`.
-    pub fn of_document(document: &Document, name: Option<&str>, aspect: f64) -> Self {
-        let camera = name.and_then(|name| document.find_camera(name)).or_else(|| document.main_camera());
-        match (camera, document.bounds()) {
+    /// The document's camera of this name.
+    ///
+    /// # Errors
+    /// With the names there are, when it is none of them.
+    pub fn named(document: &Document, name: &str) -> anyhow::Result<Self> {
+        let Some(camera) = document.find_camera(name) else {
+            let known = document.camera_names();
+            let known = if known.is_empty() { String::from("the file has none") } else { known.join(", ") };
+            bail!("no camera '{name}'; there is: {known}");
+        };
+        Ok(Self::of_placed(&camera))
+    }
+
+    /// The document's main camera, else one that frames everything in an image of width / height `aspect`.
+    pub fn of_document(document: &Document, aspect: f64) -> Self {
+        match (document.main_camera(), document.bounds()) {
             (Some(camera), _) => Self::of_placed(&camera),
             (None, Some((low, high))) => Self::framing(low, high, aspect),
             (None, None) => Self::default(),

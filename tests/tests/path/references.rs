@@ -26,7 +26,7 @@ fn folder() -> PathBuf {
 fn open(session: &mut Session, file: &Path) {
     let loaded = load(file, false, &|_, _| ()).expect("the scene loads");
     session.open(file, loaded).expect("the scene opens");
-    session.set_camera(ViewCamera::of_document(session.document(), None, 1.0));
+    session.set_camera(ViewCamera::of_document(session.document(), 1.0));
 }
 
 fn new_session(gpu: &gpu::Session) -> Session {

@@ -61,7 +61,7 @@ pub(super) fn run(bench: &Bench) -> anyhow::Result<Measured> {
     for scene in &args.scenes {
         bar.set_message(scene.display().to_string());
         session.open(scene, load(scene, true, &|_, _| ())?).with_context(|| scene.display().to_string())?;
-        session.set_camera(ViewCamera::of_document(session.document(), None, 1.0));
+        session.set_camera(ViewCamera::of_document(session.document(), 1.0));
         let of = |sampler, seed| ViewSettings {
             pipeline: Pipeline::Path,
             sampler,

@@ -1,12 +1,17 @@
 //! The error of the view's picture over the time that it took, for as long as the window is open. Enters: the session, once a frame.
 //! Leaves: curves for the Error panel. It makes references by letting the view be one for a while.
 
+mod flip;
+
 use std::sync::Arc;
 
-use caustica_renderer::ViewSettings;
+use anyhow::Context;
+use caustica_renderer::{Accumulated, ViewSettings};
 
+use self::flip::FlipWatch;
 use crate::reference::settings_of_truth;
 use crate::session::{Session, ViewCamera};
+use crate::worker::Wake;
 
 /// Curves that are kept, the newest.
 const CURVES: usize = 16;
@@ -57,7 +62,7 @@ struct Making {
 }
 
 /// All curves, and the reference.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct ErrorWatch {
     /// Oldest first.
     pub curves: Vec<LiveCurve>,
@@ -70,8 +75,10 @@ pub struct ErrorWatch {
     /// Samples and milliseconds so far.
     so_far: (u64, f64),
     making: Option<Making>,
-    /// What the reference shows.
-    reference_of: Option<Subject>,
+    /// The reference and what it shows.
+    reference: Option<(Arc<Accumulated>, Subject)>,
+    /// FLIP against it.
+    pub flip: FlipWatch,
 }
 
 impl Default for ErrorWatch {
@@ -83,7 +90,8 @@ impl Default for ErrorWatch {
             resets: None,
             so_far: (0, 0.0),
             making: None,
-            reference_of: None,
+            reference: None,
+            flip: FlipWatch::default(),
         }
     }
 }
@@ -93,6 +101,7 @@ impl ErrorWatch {
     pub fn look(&mut self, session: &mut Session) {
         let subject = subject_of(session);
         self.keep_reference(session, subject);
+        self.flip.poll();
         let statistics = session.statistics();
         if self.resets != Some(statistics.resets) {
             self.begin(session, subject);
@@ -139,7 +148,9 @@ impl ErrorWatch {
     }
 
     fn take_point(&mut self, session: &Session) {
-        let (Some(found), Some(curve)) = (session.live_error(), self.curves.last_mut()) else { return };
+        let Some(found) = session.live_error() else { return };
+        let gpu_ms = self.gpu_ms_of(found.samples);
+        let Some(curve) = self.curves.last_mut() else { return };
         // Frames that share their past do not tell how far they are from the truth.
         let noise = found.noise.filter(|_| !session.settings().denoise_stills);
         let error = match found.against {
@@ -148,16 +159,19 @@ impl ErrorWatch {
         };
         let is_new = curve.points.last().is_none_or(|last| last.samples < found.samples);
         let against_reference = found.against.is_some();
-        if error <= 0.0 || !is_new || self.so_far.0 == 0 {
-            return;
-        }
+        let Some(gpu_ms) = gpu_ms.filter(|_| error > 0.0 && is_new) else { return };
         if curve.against_reference != against_reference {
             // The one is not the continuation of the other.
             curve.points.clear();
             curve.against_reference = against_reference;
         }
-        let gpu_ms = self.so_far.1 * found.samples as f64 / self.so_far.0 as f64;
         curve.points.push(LivePoint { samples: found.samples, gpu_ms, error });
+    }
+
+    /// Milliseconds on the device until the picture had so many samples; `None`: nothing has been rendered.
+    pub fn gpu_ms_of(&self, samples: u64) -> Option<f64> {
+        let (so_far, ms) = self.so_far;
+        (so_far > 0).then(|| ms * samples as f64 / so_far as f64)
     }
 
     /// Lets the view be the reference until it has so many samples.
@@ -169,10 +183,8 @@ impl ErrorWatch {
             tone_map: before.tone_map,
             ..settings_of_truth(&before)
         });
-        session.set_reference(None);
-        self.reference_of = None;
+        self.set_reference(session, None);
         self.making = Some(Making { samples, subject: subject_of(session), before });
-        self.note.clear();
     }
 
     /// Ends the making of a reference, as if it had not been begun.
@@ -188,12 +200,9 @@ impl ErrorWatch {
     }
 
     /// Compares with this picture of what is shown.
-    pub fn set_reference(
-        &mut self,
-        session: &mut Session,
-        picture: Option<Arc<caustica_renderer::Accumulated>>,
-    ) {
-        self.reference_of = picture.is_some().then(|| subject_of(session));
+    pub fn set_reference(&mut self, session: &mut Session, picture: Option<Arc<Accumulated>>) {
+        self.reference = picture.clone().map(|picture| (picture, subject_of(session)));
+        self.flip = FlipWatch::default();
         self.note.clear();
         session.set_reference(picture);
     }
@@ -207,10 +216,21 @@ impl ErrorWatch {
             } else if session.samples() >= making.samples && !session.textures_settle() {
                 self.finish_reference(session);
             }
-        } else if self.reference_of.is_some_and(|of| of != subject) {
+        } else if self.reference.as_ref().is_some_and(|(_, of)| *of != subject) {
             self.set_reference(session, None);
             self.note = String::from("The reference was dropped: something else is shown.");
         }
+    }
+
+    /// Begins to measure FLIP of the picture as it is now.
+    ///
+    /// # Errors
+    /// When there is no reference, or the picture cannot be read.
+    pub fn measure_flip(&mut self, session: &mut Session, wake: Wake) -> anyhow::Result<()> {
+        let (reference, _) = self.reference.as_ref().context("there is no reference to compare with")?;
+        let picture = session.read_back()?;
+        self.flip.start(Arc::clone(reference), picture, session.settings().exposure_ev.exp2(), wake);
+        Ok(())
     }
 
     fn finish_reference(&mut self, session: &mut Session) {

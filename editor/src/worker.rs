@@ -94,6 +94,12 @@ impl<T: Send + 'static> Job<T> {
     }
 }
 
+impl<T> std::fmt::Debug for Job<T> {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        to.debug_struct("Job").field("label", &self.label).finish_non_exhaustive()
+    }
+}
+
 struct WakeOnDrop(Wake);
 
 impl Drop for WakeOnDrop {

@@ -25,6 +25,8 @@ struct ErrorBlock {
     float variance;                     // of the picture, times w
     float bias;                         // (a - p)(b - q) w, of the streams of the picture and of the reference
     float of_means;                     // (x - r)^2 w of the means of the block; 0 where it is cut by the edge
+    float largest_squared;              // the largest (x - r)^2 of a pixel, mean over its channels
+    float largest_relative;             // the largest (x - r)^2 w of a pixel, likewise
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer ReferenceTable { ReferencePixel at[]; };

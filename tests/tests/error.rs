@@ -83,6 +83,12 @@ fn the_device_measures_what_the_host_does() {
         near(against.split.bias.high, split.bias.high, "upper end of the bias");
         near(against.rmse, metrics.rmse, "RMSE");
         near(against.rel_mse, metrics.rel_mse, "relMSE");
+        for (found, trimmed, whole) in [
+            (against.rmse_trimmed, metrics.rmse_trimmed, metrics.rmse),
+            (against.rel_mse_trimmed, metrics.rel_mse_trimmed, metrics.rel_mse),
+        ] {
+            assert!(trimmed * 0.998 <= found && found < whole, "trimmed: {found}, {trimmed} to {whole}");
+        }
         near(against.block_rel_mse, metrics.block_rel_mse, "relMSE of blocks");
         near(against.luminance_ratio, metrics.luminance_ratio, "luminance");
         // Hybrid has no light that surfaces send on to each other.

@@ -119,6 +119,8 @@ pub enum Action {
     Environment,
     /// Ask for a picture to compare with.
     OpenReference,
+    /// Measure FLIP of the picture as it is, against the reference.
+    MeasureFlip,
     /// Surround the scene with this image.
     EnvironmentPath(PathBuf),
     /// Lower the resolution while something moves, or not.

@@ -65,6 +65,11 @@ impl Editor {
             Action::ToggleProjection => self.toggle_projection(),
             Action::Environment => self.ask(Wish::Environment),
             Action::OpenReference => self.ask(Wish::Reference),
+            Action::MeasureFlip => {
+                if let Err(error) = self.state.error.measure_flip(&mut self.session, self.wake.clone()) {
+                    self.state.toasts.error(format!("FLIP was not measured: {error:#}"));
+                }
+            }
             Action::PlayPause
             | Action::ToStart
             | Action::StepBack

@@ -20,22 +20,40 @@ const COLORS: [Color32; 6] = [
     Color32::from_rgb(0x3a, 0xa9, 0xb8),
 ];
 const FIGURES_WIDTH: f32 = 330.0;
+const CONTROLS_WIDTH: f32 = 300.0;
+/// A plot that is narrower shows nothing.
+const LEAST_PLOT_WIDTH: f32 = 260.0;
 
 /// Draws the panel.
 pub fn ui(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let size = egui::vec2(FIGURES_WIDTH, ui.available_height());
+    let is_wide = ui.available_width() > FIGURES_WIDTH + CONTROLS_WIDTH + LEAST_PLOT_WIDTH;
     ui.horizontal_top(|ui| {
-        ui.allocate_ui_with_layout(size, egui::Layout::top_down(egui::Align::Min), |ui| {
-            egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                figures(cx, ui);
+        column(ui, "figures", FIGURES_WIDTH, |ui| {
+            figures(cx, ui);
+            if !is_wide {
                 ui.add_space(4.0);
-                reference(cx, ui);
-                stop(cx, ui);
-                maps(cx, ui);
-            });
+                controls(cx, ui);
+            }
         });
+        if is_wide {
+            column(ui, "controls", CONTROLS_WIDTH, |ui| controls(cx, ui));
+        }
         plot(cx, ui);
     });
+}
+
+fn column(ui: &mut Ui, name: &str, width: f32, content: impl FnOnce(&mut Ui)) {
+    let size = egui::vec2(width, ui.available_height());
+    ui.allocate_ui_with_layout(size, egui::Layout::top_down(egui::Align::Min), |ui| {
+        egui::ScrollArea::vertical().id_salt(name).auto_shrink([false, false]).show(ui, content);
+    });
+}
+
+fn controls(cx: &mut Cx<'_>, ui: &mut Ui) {
+    reference(cx, ui);
+    flip(cx, ui);
+    stop(cx, ui);
+    maps(cx, ui);
 }
 
 fn percent(share: f64) -> String {
@@ -80,13 +98,14 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui) {
             );
             row(ui, "Error", percent(against.split.total), "Noise and bias together");
             let rest = format!(
-                "RMSE {:.4}, blocks {}, luminance x {:.4}",
+                "trimmed {}, RMSE {:.4}, blocks {}, luminance x {:.4}",
+                percent(against.rel_mse_trimmed.sqrt()),
                 against.rmse,
                 percent(against.block_rel_mse.sqrt()),
                 against.luminance_ratio
             );
             ui.label(RichText::new(rest).monospace().weak()).on_hover_text(
-                "Root of the mean squared difference; error of the means of blocks of 8 x 8 pixels; mean luminance by that of the reference",
+                "Error without the 0.1 % of pixels where it is largest; root of the mean squared difference; error of the means of blocks of 8 x 8 pixels; mean luminance by that of the reference",
             );
         }
         None => {
@@ -95,12 +114,49 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui) {
             row(ui, "Bias", String::from(words), "What stays, however many samples are taken");
         }
     }
-    if let (Some(target), Some(noise), Some(ms)) = (cx.session.stop_at(), found.noise, cx.session.device_ms())
-    {
-        let seconds = noise.seconds_to(target, ms * found.samples as f64 * 1e-3);
-        let words = format!("{:.1} s on the device to {}", seconds.value, percent(target));
-        ui.label(RichText::new(words).monospace()).on_hover_text("As the noise falls with the samples");
+    let noise = found.noise.filter(|_| !settings.denoise_stills);
+    let (Some(noise), Some(ms)) = (noise, cx.state.error.gpu_ms_of(found.samples)) else { return };
+    let seconds = ms * 1e-3;
+    let of = |estimate: Estimate, digits: usize| {
+        let Estimate { value, low, high } = estimate;
+        format!("{value:.digits$} ({low:.digits$} to {high:.digits$})")
+    };
+    let tip = "1 / (relMSE x seconds on the device), with the interval that holds it in 95 of 100 cases: how much a second buys";
+    row(ui, "Buys", of(noise.efficiency(seconds), 1), tip);
+    // Half of the noise takes four times as long, whatever is asked for.
+    let target = cx.session.stop_at().unwrap_or(noise.error().value / 2.0);
+    let words = format!("{} s to {}", of(noise.seconds_to(target, seconds), 1), percent(target));
+    let tip = "More seconds on the device until the noise is so small (what is stopped at, else half of it), as it falls with the samples";
+    row(ui, "Time", words, tip);
+}
+
+fn flip(cx: &mut Cx<'_>, ui: &mut Ui) {
+    if !cx.session.has_reference() || cx.state.error.progress(cx.session).is_some() {
+        return;
     }
+    ui.horizontal(|ui| {
+        let flip = &cx.state.error.flip;
+        let button = egui::Button::new("FLIP");
+        let tip = "How differently the picture looks from the reference, 0 to 1, as it is now (Andersson et al. 2020)";
+        let clicked = ui.add_enabled(!flip.is_running(), button).on_hover_text(tip).clicked();
+        match flip.found() {
+            Some((Ok(mean), samples)) => {
+                ui.label(RichText::new(format!("{mean:.4} at {samples} samples")).monospace());
+            }
+            Some((Err(error), _)) => {
+                ui.label(error);
+            }
+            None if flip.is_running() => {
+                ui.spinner();
+            }
+            None => {
+                ui.weak("not measured");
+            }
+        }
+        if clicked {
+            cx.act(Action::MeasureFlip);
+        }
+    });
 }
 
 fn reference(cx: &mut Cx<'_>, ui: &mut Ui) {

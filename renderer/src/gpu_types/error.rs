@@ -14,7 +14,7 @@ twins! {
     }
 
     /// Sums over the pixels of a block; those of squares are means over the channels.
-    struct ErrorBlock, size 56 {
+    struct ErrorBlock, size 64 {
         /// Radiance.
         0 sum: [f32; 3],
         /// Of the reference.
@@ -35,5 +35,9 @@ twins! {
         48 bias: f32,
         /// (x - r)^2 w of the means of the block; 0 where it is cut by the edge.
         52 of_means: f32,
+        /// The largest (x - r)^2 of a pixel, mean over its channels.
+        56 largest_squared: f32,
+        /// The largest (x - r)^2 w of a pixel, likewise.
+        60 largest_relative: f32,
     }
 }

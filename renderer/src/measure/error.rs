@@ -157,9 +157,14 @@ fn means(errors: impl Iterator<Item = f64>) -> [f64; 2] {
     let mut errors: Vec<f64> = errors.collect();
     let all = errors.iter().sum::<f64>() / errors.len() as f64;
     errors.sort_unstable_by(f64::total_cmp);
-    let kept = ((errors.len() as f64 * (1.0 - TRIMMED_SHARE)).round_ties_even() as usize).max(1);
+    let kept = kept_of(errors.len());
     let trimmed = errors.iter().take(kept).sum::<f64>() / kept as f64;
     [all, trimmed]
+}
+
+/// Pixels of so many that a trimmed form keeps.
+pub(super) fn kept_of(pixels: usize) -> usize {
+    ((pixels as f64 * (1.0 - TRIMMED_SHARE)).round_ties_even() as usize).max(1)
 }
 
 fn finite(pixel: [f32; 3]) -> [f64; 3] {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::error::luminance;
+use super::error::{kept_of, luminance};
 use super::noise::Noise;
 use super::split::Split;
 use crate::gpu_types::{ERROR_BLOCK_SIDE, ErrorBlock};
@@ -20,13 +20,18 @@ pub struct LiveError {
     pub against: Option<Against>,
 }
 
-/// Differences from a reference, as [`super::ErrorMetrics`] has them; the trimmed forms and FLIP are measured on the host alone.
+/// Differences from a reference, as [`super::ErrorMetrics`] has them; FLIP is measured on the host alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Against {
     /// Root of the mean squared difference, radiance.
     pub rmse: f64,
+    /// The same without the 0.1 % of pixels with the largest error; at most one of each block of 8 x 8 is left out, so that it may be
+    /// larger than that of the host.
+    pub rmse_trimmed: f64,
     /// mean((x - r)^2 / (r^2 + 0.01)).
     pub rel_mse: f64,
+    /// The same without the 0.1 % of pixels with the largest error, likewise.
+    pub rel_mse_trimmed: f64,
     /// The same of the means of blocks of 8 x 8 pixels; NaN where the picture is smaller than a block.
     pub block_rel_mse: f64,
     /// Mean luminance by that of the reference.
@@ -56,9 +61,18 @@ impl LiveError {
             let (found, expected) = (sums(|b| b.sum), sums(|b| b.reference_sum));
             let whole = extent.map(|side| f64::from(side / ERROR_BLOCK_SIDE)).iter().product::<f64>();
             let bias: Vec<f64> = blocks.iter().map(|block| f64::from(block.bias)).collect();
+            let (squared, relative) = (sum(|b| b.squared), sum(|b| b.relative));
+            let kept = kept_of(pixels as usize);
+            let trimmed = |sum: f64, largest: fn(&ErrorBlock) -> f32| {
+                let mut largest: Vec<f64> = blocks.iter().map(|block| f64::from(largest(block))).collect();
+                largest.sort_unstable_by(|a, b| b.total_cmp(a));
+                (sum - largest.iter().take(pixels as usize - kept).sum::<f64>()) / kept as f64
+            };
             Against {
-                rmse: (sum(|b| b.squared) / pixels).sqrt(),
-                rel_mse: sum(|b| b.relative) / pixels,
+                rmse: (squared / pixels).sqrt(),
+                rmse_trimmed: trimmed(squared, |b| b.largest_squared).sqrt(),
+                rel_mse: relative / pixels,
+                rel_mse_trimmed: trimmed(relative, |b| b.largest_relative),
                 block_rel_mse: sum(|b| b.of_means) / whole,
                 luminance_ratio: luminance(found) / luminance(expected),
                 channel_ratios: [0, 1, 2].map(|i| found[i] / expected[i]),

@@ -15,7 +15,7 @@ shared ErrorBlock partial[PIXELS];
 ErrorBlock add(ErrorBlock a, ErrorBlock b) {
     return ErrorBlock(a.sum + b.sum, a.reference_sum + b.reference_sum, a.noise + b.noise, a.noise_squares + b.noise_squares,
                       a.squared + b.squared, a.relative + b.relative, a.total + b.total, a.variance + b.variance, a.bias + b.bias,
-                      a.of_means + b.of_means);
+                      a.of_means + b.of_means, max(a.largest_squared, b.largest_squared), max(a.largest_relative, b.largest_relative));
 }
 
 ErrorBlock of_pixel(Frame frame, uvec2 pixel) {
@@ -23,7 +23,7 @@ ErrorBlock of_pixel(Frame frame, uvec2 pixel) {
     vec3 x = mean_of(streams);
     vec3 d = half_difference_of(streams);
     float noise = relative_variance(x, d);
-    ErrorBlock found = ErrorBlock(x, vec3(0.0), noise, noise * noise, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    ErrorBlock found = ErrorBlock(x, vec3(0.0), noise, noise * noise, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     if (frame.reference != 0ul) {
         ReferencePixel known = ReferenceTable(frame.reference).at[pixel.y * frame.extent_px.x + pixel.x];
         vec3 r = known.mean;
@@ -33,6 +33,8 @@ ErrorBlock of_pixel(Frame frame, uvec2 pixel) {
         found.reference_sum = r;
         found.squared = mean_of_channels(difference * difference);
         found.relative = mean_of_channels(difference * difference * w);
+        found.largest_squared = found.squared;
+        found.largest_relative = found.relative;
         found.total = mean_of_channels((difference * difference - e * e) * w);
         found.variance = mean_of_channels(d * d * w);
         found.bias = mean_of_channels((difference + (d - e)) * (difference - (d - e)) * w);
@@ -44,7 +46,7 @@ void main() {
     Frame frame = FrameTable(push.frame_address).frame;
     uvec2 pixel = gl_GlobalInvocationID.xy;
     uint lane = gl_LocalInvocationIndex;
-    const ErrorBlock nothing = ErrorBlock(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    const ErrorBlock nothing = ErrorBlock(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     partial[lane] = nothing;
     if (all(lessThan(pixel, frame.extent_px))) {
         partial[lane] = of_pixel(frame, pixel);

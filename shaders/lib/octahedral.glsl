@@ -3,6 +3,9 @@
 #ifndef LIB_OCTAHEDRAL
 #define LIB_OCTAHEDRAL
 
+// The code of no vector: packSnorm2x16 makes no -32768.
+const uint OCTAHEDRAL_NONE = 0x80008000u;
+
 vec2 octahedral_fold(vec2 v) {
     return (1.0 - abs(v.yx)) * vec2(v.x >= 0.0 ? 1.0 : -1.0, v.y >= 0.0 ? 1.0 : -1.0);
 }

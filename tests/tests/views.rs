@@ -219,6 +219,25 @@ fn what_an_earlier_sample_lost_stays_marked_until_the_reset() {
 }
 
 #[test]
+fn normals_have_colours_whatever_they_face() {
+    let mut scene = Scene::new();
+    let paint = scene.material(lambert(0.5));
+    let mesh = scene.mesh(quad(0.8, 0.8));
+    scene.place(mesh, paint, at(-0.5, 0.0, 0.0));
+    scene.place(mesh, paint, at(0.5, 0.0, 0.0) * Affine3A::from_rotation_y(-0.5));
+    for show in [Show::Normal, Show::GeometricNormal] {
+        let mut studio =
+            Studio::of(EXTENT, still(Pipeline::Raster, show), &scene.delta, camera_parallel(2.0, 1.0));
+        let picture = shown(&mut studio, 1);
+        // As bytes of an sRGB picture they are (n + 1) / 2.
+        let color = |x: f32, z: f32| [x, 0.0, z].map(|c| ((0.5 * c + 0.5 + 0.055) / 1.055).powf(2.4));
+        assert_near("towards +Z", picture[pixel_of(-0.5, 0.0, 1.0)], color(0.0, 1.0));
+        assert_near("aside", picture[pixel_of(0.5, 0.0, 1.0)], color(-(0.5_f32.sin()), 0.5_f32.cos()));
+        assert_near("nothing", picture[pixel_of(0.0, 0.9, 1.0)], NOTHING);
+    }
+}
+
+#[test]
 fn edges_are_one_pixel_wide_at_any_distance() {
     let mut scene = Scene::new();
     scene.put(quad(1.0, 1.0), lambert(0.5), Affine3A::IDENTITY);

@@ -3,6 +3,7 @@
 #define PASS_GBUFFER_STORE
 
 #include "lib/gbuffer.glsl"
+#include "lib/octahedral.glsl"
 
 #ifdef GBUFFER_IDS_GIVEN
 layout(set = 1, binding = 0, rgba32ui) uniform uimage2D gbuffer_id;
@@ -31,7 +32,7 @@ void store_pixel(ivec2 at, GbufferPixel pixel) {
 
 void store_background(ivec2 at) {
     imageStore(gbuffer_id, at, uvec4(0u));
-    imageStore(gbuffer_normal, at, uvec4(0u));
+    imageStore(gbuffer_normal, at, uvec4(OCTAHEDRAL_NONE));
     imageStore(gbuffer_base_color, at, vec4(0.0));
     imageStore(gbuffer_material, at, vec4(0.0));
     if (NEEDS_MOTION) {

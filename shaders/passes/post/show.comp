@@ -25,7 +25,7 @@ vec3 id_color(uint id) {
 
 // Directions as colours, in the usual way: (n + 1) / 2, not encoded again.
 vec3 normal_color(uint encoded) {
-    return srgb_decode(0.5 * octahedral_decode(encoded) + 0.5);
+    return encoded == OCTAHEDRAL_NONE ? vec3(0.0) : srgb_decode(0.5 * octahedral_decode(encoded) + 0.5);
 }
 
 // Grey at rest; right and down are brighter red and green; 8 pixels a frame reach full colour.
@@ -61,7 +61,7 @@ vec3 show_uint(Frame frame, uvec4 value) {
     switch (push.argument0) {
         case SHOW_NORMAL:
         case SHOW_GEOMETRIC_NORMAL:
-            return (value.x | value.y) == 0u ? vec3(0.0) : normal_color(push.argument0 == SHOW_NORMAL ? value.x : value.y);
+            return normal_color(push.argument0 == SHOW_NORMAL ? value.x : value.y);
         case SHOW_RAY_DEPTH: return depth_color(value.x, frame.max_depth);
         default: break;
     }

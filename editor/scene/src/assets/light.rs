@@ -97,7 +97,7 @@ impl Light {
 pub struct Camera {
     /// Projection.
     pub projection: Projection,
-    /// Nothing nearer than this is drawn, metres, above 0.
+    /// Nothing nearer than this is drawn, metres, above 0; of a parallel camera at least 0.
     pub near_m: f32,
     /// Nothing farther than this is drawn, metres; `None`: no end. Kept for export, rays have no far plane.
     pub far_m: Option<f32>,

@@ -93,12 +93,19 @@ fn second_texture_coordinates_colours_and_sparse_positions_are_read() {
 #[test]
 fn parallel_cameras_keep_their_size_and_shape() {
     let mut file = GltfFile::new();
-    let lens = json!({"xmag": 4, "ymag": 2, "znear": 0.5, "zfar": 50});
-    file.push("cameras", json!({"type": "orthographic", "orthographic": lens}));
+    // They may see from where they are on.
+    for near in [0.5, 0.0] {
+        let lens = json!({"xmag": 4, "ymag": 2, "znear": near, "zfar": 50});
+        file.push("cameras", json!({"type": "orthographic", "orthographic": lens}));
+    }
     file.push("nodes", json!({"camera": 0}));
-    let camera = read(&file).prefab.nodes()[0].camera.unwrap();
-    assert!(matches!(camera.projection, Projection::Orthographic { ymag_m } if ymag_m == 2.0));
-    assert_eq!((camera.aspect, camera.near_m, camera.far_m), (Some(2.0), 0.5, Some(50.0)));
+    file.push("nodes", json!({"camera": 1}));
+    let prefab = read(&file).prefab;
+    for (node, near_m) in prefab.nodes().iter().zip([0.5, 0.0]) {
+        let camera = node.camera.unwrap();
+        assert!(matches!(camera.projection, Projection::Orthographic { ymag_m } if ymag_m == 2.0));
+        assert_eq!((camera.aspect, camera.near_m, camera.far_m), (Some(2.0), near_m, Some(50.0)));
+    }
 }
 
 #[test]

@@ -176,7 +176,7 @@ fn aspect_of(lens: &Item<'_>, ymag_m: f32, warnings: &mut Vec<Fault>) -> Result<
 fn ends(lens: &Item<'_>, may_be_zero: bool, warnings: &mut Vec<Fault>) -> Result<(f32, Option<f32>), Fault> {
     let begins_at_zero = may_be_zero && lens.f64("znear")? == Some(0.0);
     let near_m = match begins_at_zero {
-        true => None,
+        true => Some(0.0),
         false => above_zero(lens, "znear", &format!("{DEFAULT_NEAR_M} is taken"), warnings)?,
     };
     let far_m = above_zero(lens, "zfar", "it is left out, and the camera sees without end", warnings)?;

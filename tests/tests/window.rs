@@ -315,7 +315,8 @@ fn what_is_typed_into_a_shader_outlives_the_end_of_the_editor() {
     let texts = serde_json::json!({ "folder": &shaders, "texts": { "lib/fresnel.glsl": "// mine\n" } });
     std::fs::write(&left, texts.to_string()).expect("a text that was left behind");
     let arguments = ["--shaders", shaders.to_str().expect("a path")];
-    for end in ["-TERM", "-HUP", "-KILL"] {
+    // Not by a lost terminal, which `nohup` has it ignore.
+    for end in ["-TERM", "-KILL"] {
         let mut editor = Editor::start_with(&desktop, folder.path(), &cube(false), &arguments);
         let log = editor.log.clone();
         let words = "lib/fresnel.glsl: what was typed and not saved when the program ended is back";
@@ -339,7 +340,7 @@ fn what_is_typed_into_a_shader_outlives_the_end_of_the_editor() {
         editor.process.wait().expect("the end");
     }
     let (_, text) = typed(&journals).expect("it is left behind");
-    assert!(text.contains("// mine") && text.matches("abc").count() >= 3, "{text}");
+    assert!(text.contains("// mine") && text.matches("abc").count() >= 2, "{text}");
 }
 
 /// Holds the only journal that there is, as its process does.

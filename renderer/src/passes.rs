@@ -47,7 +47,7 @@ use crate::error::Result;
 use crate::gpu_types::Push;
 use crate::needs::Needs;
 use crate::settings::Show;
-use crate::shader::{Live, Owner, ShaderLibrary, StageOf, merge_interfaces};
+use crate::shader::{Live, Owner, ShaderLibrary, StageOf, check_varyings, merge_interfaces};
 use crate::tables::Tables;
 use crate::view::View;
 use ray_pipeline::RayFiles;
@@ -59,7 +59,7 @@ const TABLE_GROUP: [u32; 3] = [64, 1, 1];
 /// Builds pipelines for one set of needs.
 pub(crate) struct Builder<'a> {
     pub(crate) device: &'a Arc<Device>,
-    pub(crate) library: &'a ShaderLibrary,
+    pub(crate) library: &'a Arc<ShaderLibrary>,
     pub(crate) layout: &'a Arc<SceneLayout>,
     pub(crate) needs: Needs,
     pub(crate) specialization: Specialization,
@@ -101,11 +101,13 @@ impl Builder<'_> {
         let make = move |stage: StageOf<'_>| {
             let (vertex, fragment) = (stage(vertex_file)?, stage(fragment_file)?);
             let interface = merge_interfaces(&[&vertex, &fragment])?;
+            let target = Format::Rgba32Uint;
+            check_varyings(&vertex, &fragment, &[target])?;
             let desc = GraphicsDesc {
                 name: frame.label,
                 vertex: &vertex.module,
                 fragment: &fragment.module,
-                colors: &[ColorTarget { format: Format::Rgba32Uint }],
+                colors: &[ColorTarget { format: target }],
                 depth: Some(Format::Depth32),
             };
             Ok(GraphicsPipeline::new(&frame.device, &desc, &interface, &frame.specialization, frame.scene())?)
@@ -124,7 +126,7 @@ impl Builder<'_> {
 }
 
 fn compute(
-    library: &ShaderLibrary,
+    library: &Arc<ShaderLibrary>,
     owner: &Arc<Owner>,
     frame: Frame,
     file: &'static str,
@@ -143,7 +145,7 @@ fn compute(
 /// Builds a pass that works on tables alone: no scene set, no needs.
 fn table_pass(
     device: &Arc<Device>,
-    library: &ShaderLibrary,
+    library: &Arc<ShaderLibrary>,
     label: &'static str,
     file: &'static str,
 ) -> Result<Live<ComputePipeline>> {
@@ -152,7 +154,7 @@ fn table_pass(
     let frame = Frame { label, device, layout: None, specialization: Specialization::default() };
     let live = compute(library, &owner, frame, file, TABLE_GROUP)?;
     // Nothing is bound beside the tables: known before the first frame that needs the pass.
-    live.get(&[]);
+    live.get(&[])?;
     Ok(live)
 }
 
@@ -190,7 +192,7 @@ impl Scope<'_> {
         argument0: u32,
     ) -> Result<()> {
         let mut all = uses.to_vec();
-        let pipeline = pipeline.get(binds);
+        let pipeline = pipeline.get(binds)?;
         if pipeline.interface().uses_scene {
             all.extend(self.tables.uses(Stage::Compute));
         }
@@ -219,7 +221,7 @@ impl Scope<'_> {
         argument0: u32,
     ) -> Result<()> {
         let mut all = uses.to_vec();
-        let pipeline = pipeline.get(binds);
+        let pipeline = pipeline.get(binds)?;
         all.extend(self.tables.uses(Stage::RayTracing));
         all.extend(self.accel.uses());
         let push = self.push(argument0, self.rows.start);
@@ -240,7 +242,7 @@ pub(crate) struct ScenePasses {
 }
 
 impl ScenePasses {
-    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &Arc<ShaderLibrary>) -> Result<Self> {
         Ok(Self {
             blas_surface: BlasSurface::new(device, library)?,
             deform: Deform::new(device, library)?,

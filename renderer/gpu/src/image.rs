@@ -40,6 +40,11 @@ pub enum Format {
 }
 
 impl Format {
+    /// Whether its texels are unsigned integers, and not floating-point numbers to a shader.
+    pub fn is_uint(self) -> bool {
+        matches!(self, Self::Rg32Uint | Self::Rgba32Uint | Self::R32Uint)
+    }
+
     pub(crate) fn raw(self) -> vk::Format {
         match self {
             Self::Rgba8Unorm => vk::Format::R8G8B8A8_UNORM,

@@ -54,6 +54,8 @@ pub struct Binding {
     pub kind: BindingKind,
     /// Of a storage image: the format that the shader declares, if it does.
     pub format: Option<Format>,
+    /// Of an image without a format: whether the shader reads unsigned integers.
+    pub reads_uint: bool,
 }
 
 /// What a pipeline needs from the host.

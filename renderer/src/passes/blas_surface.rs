@@ -16,7 +16,7 @@ pub(crate) struct BlasSurface {
 }
 
 impl BlasSurface {
-    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &Arc<ShaderLibrary>) -> Result<Self> {
         let file = "passes/blas_surface/blas_surface.comp";
         Ok(Self { pipeline: table_pass(device, library, "blas_surface", file)? })
     }
@@ -29,7 +29,7 @@ impl BlasSurface {
         uses: &[Use<'_>],
     ) -> Result<()> {
         let frame_address = recorder.stage_bytes(bytemuck::cast_slice(jobs))?;
-        let pipeline = self.pipeline.get(&[]);
+        let pipeline = self.pipeline.get(&[])?;
         recorder.pass("accel.surface", |recorder| {
             recorder.declare(uses);
             for (argument0, job) in (0..).zip(jobs) {

@@ -15,7 +15,7 @@ pub(crate) struct Deform {
 }
 
 impl Deform {
-    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &Arc<ShaderLibrary>) -> Result<Self> {
         Ok(Self { pipeline: table_pass(device, library, "deform", "passes/deform/deform.comp")? })
     }
 
@@ -30,7 +30,7 @@ impl Deform {
             return Ok(());
         }
         let frame_address = recorder.stage_bytes(bytemuck::cast_slice(jobs))?;
-        let pipeline = self.pipeline.get(&[]);
+        let pipeline = self.pipeline.get(&[])?;
         recorder.pass("deform", |recorder| {
             // Declared once: the jobs write vertices of their own, so they may run side by side.
             recorder.declare(&[Use::Group(geometry, Stage::Compute, Access::StorageReadWrite)]);

@@ -78,8 +78,8 @@ impl GBuffer {
         match self {
             Self::Rays { trace } => scope.whole().rays(recorder, "gbuffer.trace", trace, &binds, &[], 1),
             Self::Raster { opaque, alpha, shapes, resolve } => {
-                let pipelines = [Some(opaque), alpha.as_ref(), shapes.as_ref()]
-                    .map(|live| live.map(|live| live.get(&[])));
+                let get = |live: Option<&Live<GraphicsPipeline>>| live.map(|live| live.get(&[])).transpose();
+                let pipelines = [get(Some(opaque))?, get(alpha.as_ref())?, get(shapes.as_ref())?];
                 draw(recorder, scope, pipelines, &targets.id, depth)?;
                 scope.compute(recorder, "gbuffer.resolve", resolve, &binds, &[], 0)
             }

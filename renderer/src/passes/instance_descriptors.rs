@@ -28,7 +28,7 @@ pub(crate) struct InstanceDescriptors {
 }
 
 impl InstanceDescriptors {
-    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &Arc<ShaderLibrary>) -> Result<Self> {
         let file = "passes/instance_descriptors/instance_descriptors.comp";
         Ok(Self { pipeline: table_pass(device, library, "instance_descriptors", file)? })
     }
@@ -54,7 +54,7 @@ impl InstanceDescriptors {
         let job = InstanceDescriptorJob { instances, slots, blases, descriptors, dirty, count, pad0: 0 };
         let frame_address = recorder.stage_bytes(bytemuck::bytes_of(&job))?;
         let push = Push { frame_address, argument0: 0, argument1: 0 };
-        let pipeline = self.pipeline.get(&[]);
+        let pipeline = self.pipeline.get(&[])?;
         recorder.pass("instance_descriptors", |recorder| {
             let push = bytemuck::bytes_of(&push);
             recorder.dispatch(&pipeline, None, &[], uses, push, table_groups(count))

@@ -15,7 +15,7 @@ pub(crate) struct ShapeBoxes {
 }
 
 impl ShapeBoxes {
-    pub(crate) fn new(device: &Arc<Device>, library: &ShaderLibrary) -> Result<Self> {
+    pub(crate) fn new(device: &Arc<Device>, library: &Arc<ShaderLibrary>) -> Result<Self> {
         Ok(Self {
             pipeline: table_pass(device, library, "shape_boxes", "passes/shape_boxes/shape_boxes.comp")?,
         })
@@ -32,7 +32,7 @@ impl ShapeBoxes {
             return Ok(());
         }
         let frame_address = recorder.stage_bytes(bytemuck::cast_slice(jobs))?;
-        let pipeline = self.pipeline.get(&[]);
+        let pipeline = self.pipeline.get(&[])?;
         recorder.pass("shape_boxes", |recorder| {
             // Declared once: the jobs write boxes of their own, so they may run side by side.
             recorder.declare(&[Use::Group(geometry, Stage::Compute, Access::StorageReadWrite)]);

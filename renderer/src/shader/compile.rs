@@ -23,6 +23,10 @@ const CACHE_VERSION: u32 = 1;
 
 /// So deep files may include others.
 const MOST_INCLUDES: usize = 64;
+/// So many includes are read for one main file, each as often as it is named: files that include each other twice would never end.
+const MOST_READ: usize = 4096;
+/// The compiler goes as deep as expressions do: a long sum needs more than threads have. Memory is taken where it is used.
+const STACK_BYTES: usize = 1 << 30;
 
 /// Compiled shaders on disk. Losing it costs time only.
 #[derive(Clone, Debug, Default)]
@@ -104,18 +108,22 @@ struct Includes<'a> {
     source: &'a Source,
     /// What was asked for and is not there, with the reason.
     refused: BTreeMap<String, String>,
+    read: usize,
 }
 
 impl IncludeHandler for Includes<'_> {
     fn include(&mut self, _: IncludeType, header: &str, _: &str, depth: usize) -> Option<IncludeResult> {
         let text = self.source.texts.get(header).map(|text| unmarked(text));
         // Files that include each other would fill the memory.
-        let reason = match (depth > MOST_INCLUDES, self.source.missing.get(header)) {
-            (true, _) => format!("more than {MOST_INCLUDES} files include each other"),
-            (false, Some(reason)) => reason.clone(),
-            (false, None) => "files are included as \"PATH\", from the folder of the shaders".to_owned(),
+        self.read += 1;
+        let is_endless = depth > MOST_INCLUDES || self.read > MOST_READ;
+        let reason = match self.source.missing.get(header) {
+            _ if depth > MOST_INCLUDES => format!("more than {MOST_INCLUDES} files include each other"),
+            _ if is_endless => format!("more than {MOST_READ} includes, as files include each other"),
+            Some(reason) => reason.clone(),
+            None => "files are included as \"PATH\", from the folder of the shaders".to_owned(),
         };
-        match text.filter(|_| depth <= MOST_INCLUDES) {
+        match text.filter(|_| !is_endless) {
             Some(data) => Some(IncludeResult { name: header.to_owned(), data }),
             None => {
                 self.refused.insert(header.to_owned(), reason);
@@ -126,8 +134,14 @@ impl IncludeHandler for Includes<'_> {
 }
 
 fn compile_now(source: &Source) -> Result<Vec<u32>> {
-    let mut includes = Includes { source, refused: BTreeMap::new() };
-    words_of(source, &mut includes).map_err(|log| RendererError::Compile {
+    let mut includes = Includes { source, refused: BTreeMap::new(), read: 0 };
+    let words = std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().name(source.file.clone()).stack_size(STACK_BYTES);
+        let words = thread.spawn_scoped(scope, || words_of(source, &mut includes));
+        let words = words.map_err(|error| format!("there is no memory to compile it: {error}"))?;
+        words.join().unwrap_or_else(|_| Err(String::from("the compiler gave up")))
+    });
+    words.map_err(|log| RendererError::Compile {
         file: source.file.clone(),
         faults: ShaderFault::of_log(&log, source, &includes.refused),
     })

@@ -34,6 +34,46 @@ impl ShaderFault {
         Self { file: file.to_owned(), message: message.into(), ..Self::default() }
     }
 
+    /// A fault at the first line that holds all of these words outside of comments: where the first one stands alone if it does
+    /// somewhere, and in the main file if it can be.
+    pub(super) fn at(source: &Source, words: &[&str], message: impl Into<String>) -> Self {
+        let place_in = |line: &str, only_alone: bool| {
+            let code = line.split("//").next().unwrap_or_default();
+            let first = words.first().filter(|word| !word.is_empty())?;
+            let at = byte_of(code, first, None).filter(|at| !only_alone || is_alone(code, first, *at))?;
+            words.iter().all(|word| code.contains(word)).then(|| line[..at].chars().count() + 1)
+        };
+        let main = source.texts.get_key_value(&source.file);
+        let search = |only_alone: bool| {
+            main.into_iter().chain(&source.texts).find_map(|(file, text)| {
+                let found = |(index, line)| Some((file, index, line, place_in(line, only_alone)?));
+                text.lines().enumerate().find_map(found)
+            })
+        };
+        let Some((file, index, line, column)) = search(true).or_else(|| search(false)) else {
+            return Self::whole(&source.file, message);
+        };
+        Self {
+            file: file.clone(),
+            line: u32::try_from(index + 1).ok(),
+            column: u32::try_from(column).ok(),
+            message: message.into(),
+            source_line: Some(line.to_owned()),
+            more: 0,
+        }
+    }
+
+    /// An error about a stage's interface with its place in the texts, where it quotes what is there.
+    pub(super) fn placed(source: &Source, error: RendererError) -> RendererError {
+        let RendererError::Interface { file, reason } = error else { return error };
+        let word = match reason.strip_prefix("struct ").and_then(|rest| rest.split([':', ' ']).next()) {
+            Some(name) => format!("struct {name}"),
+            None if reason.starts_with("push constants") => String::from("push_constant"),
+            None => quoted(&reason).unwrap_or_default().to_owned(),
+        };
+        RendererError::Compile { file, faults: vec![Self::at(source, &[&word], reason)] }
+    }
+
     /// The faults that an error stands for.
     pub fn of_error(error: RendererError) -> Vec<Self> {
         match error {
@@ -147,13 +187,15 @@ fn place_in(line: &str, word: Option<&str>, end: Option<u32>) -> Option<u32> {
 
 /// Where a word stands alone in a line, else where it stands at all.
 fn byte_of(line: &str, word: &str, end: Option<u32>) -> Option<usize> {
-    let alone = |at: &usize| {
-        let before = line.get(..*at).and_then(|text| text.chars().next_back());
-        let after = line.get(at + word.len()..).and_then(|text| text.chars().next());
-        !before.is_some_and(of_name) && !after.is_some_and(of_name)
-    };
     let places = line.match_indices(word).map(|(at, _)| at);
-    places.min_by_key(|at| (!alone(at), end.map(|end| (at + 1).abs_diff(end as usize))))
+    places.min_by_key(|at| (!is_alone(line, word, *at), end.map(|end| (at + 1).abs_diff(end as usize))))
+}
+
+/// Whether the word there is no part of a longer name.
+fn is_alone(line: &str, word: &str, at: usize) -> bool {
+    let before = line.get(..at).and_then(|text| text.chars().next_back());
+    let after = line.get(at + word.len()..).and_then(|text| text.chars().next());
+    !before.is_some_and(of_name) && !after.is_some_and(of_name)
 }
 
 impl fmt::Display for ShaderFault {

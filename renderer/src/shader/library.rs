@@ -9,12 +9,13 @@ use std::time::Duration;
 
 use caustica_gpu::{Device, Interface, ShaderModule};
 
+use super::abilities;
 use super::compile::{SpirvCache, compile};
 use super::fault::ShaderFault;
 use super::limits::{self, GroupSize};
 use super::live::{Live, Make, Owner, Replaceable};
 use super::payloads::RayInterface;
-use super::reflect::reflect;
+use super::reflect::{Reflection, Varying, reflect};
 use super::sources::{ShaderSources, Source};
 use super::suspects::{HeldShader, Suspects};
 use crate::error::{RendererError, Result};
@@ -25,6 +26,9 @@ pub struct Compiled {
     pub module: ShaderModule,
     /// What it binds.
     pub interface: Interface,
+    /// What the stage before hands over, and what it hands over.
+    pub(super) inputs: Vec<Varying>,
+    pub(super) outputs: Vec<Varying>,
     /// Size of its workgroups, if it has them.
     group: Option<GroupSize>,
     pub(super) rays: RayInterface,
@@ -38,10 +42,12 @@ impl Compiled {
     /// When it does not compile, takes more than the device has, or binds what the host does not offer.
     pub fn new(device: &Arc<Device>, source: Source, cache: &SpirvCache) -> Result<Self> {
         let words = compile(&source, cache)?;
-        let interface = reflect(&source.file, &words)?.interface;
+        let placed = |error| ShaderFault::placed(&source, error);
+        let Reflection { interface, inputs, outputs } = reflect(&source.file, &words).map_err(placed)?;
+        abilities::check(&source, &words)?;
         let group = limits::check(&source, &words, device.limits())?;
         let module = ShaderModule::new(device, &source.file, &words)?;
-        Ok(Self { module, interface, group, rays: RayInterface::of(&words), source })
+        Ok(Self { module, interface, inputs, outputs, group, rays: RayInterface::of(&words), source })
     }
 
     /// Whether its workgroups are those that the host counts with.
@@ -50,6 +56,12 @@ impl Compiled {
     /// [`RendererError::Compile`] with the place: expected against found.
     pub(crate) fn check_dispatched(&self, expected: GroupSize) -> Result<()> {
         limits::check_dispatched(&self.source, self.group, expected)
+    }
+
+    /// Why it is not used, at the first line with a word.
+    pub(super) fn refuse(&self, word: &str, reason: impl Into<String>) -> RendererError {
+        let faults = vec![ShaderFault::at(&self.source, &[word], reason)];
+        RendererError::Compile { file: self.source.file.clone(), faults }
     }
 
     /// Its name without the folder.
@@ -98,10 +110,8 @@ impl ShaderLibrary {
         if let Some(stage) = self.known(file) {
             return Ok(stage);
         }
-        let compiled =
-            |sources: &ShaderSources| Compiled::new(&self.device, sources.load(file)?, &self.cache);
-        let stage = match compiled(&self.sources()) {
-            Err(error) if self.edited.load(Ordering::Relaxed) => match compiled(&ShaderSources::default()) {
+        let stage = match self.compiled(file, &self.sources()) {
+            Err(error) if self.is_edited() => match self.compiled(file, &ShaderSources::default()) {
                 Ok(built_in) => {
                     lock(&self.replaced).extend(ShaderFault::of_error(error));
                     built_in
@@ -110,14 +120,42 @@ impl ShaderLibrary {
             },
             other => other?,
         };
-        if self.edited.load(Ordering::Relaxed) {
+        if self.is_edited() {
             let built_in = ShaderSources::default().load(file).map(|source| source.texts).unwrap_or_default();
             self.suspect(&stage, &built_in);
         }
         let stage = Arc::new(stage);
-        lock(&self.stages).insert(file.to_owned(), Arc::clone(&stage));
-        *lock(&self.listed) = None;
+        self.insert(&stage);
         Ok(stage)
+    }
+
+    fn compiled(&self, file: &str, sources: &ShaderSources) -> Result<Compiled> {
+        Compiled::new(&self.device, sources.load(file)?, &self.cache)
+    }
+
+    fn insert(&self, stage: &Arc<Compiled>) {
+        lock(&self.stages).insert(stage.file().to_owned(), Arc::clone(stage));
+        *lock(&self.listed) = None;
+    }
+
+    /// Puts the built-in stages in the place of those that cannot be used together, or with what the host gives.
+    ///
+    /// # Errors
+    /// With the reason, where shaders are not edited, or these are the built-in ones.
+    pub(super) fn fall_back(&self, files: &[&str], error: RendererError) -> Result<()> {
+        let mut is_another = false;
+        for file in files.iter().filter(|_| self.is_edited()) {
+            let Ok(built_in) = self.compiled(file, &ShaderSources::default()) else { continue };
+            if self.known(file).is_none_or(|known| known.source != built_in.source) {
+                self.insert(&Arc::new(built_in));
+                is_another = true;
+            }
+        }
+        if !is_another {
+            return Err(error);
+        }
+        lock(&self.replaced).extend(ShaderFault::of_error(error));
+        Ok(())
     }
 
     /// The stage is used from the next frame on, in the place of these texts.
@@ -215,12 +253,12 @@ impl ShaderLibrary {
 
     /// Makes a pipeline of these main files that is made anew when they change.
     pub(crate) fn live<P: Send + Sync + 'static>(
-        &self,
+        self: &Arc<Self>,
         files: &[&'static str],
         owner: &Arc<Owner>,
         make: Make<P>,
     ) -> Result<Live<P>> {
-        let live = Live::new(files, owner, make, &|file| self.stage(file))?;
+        let live = Live::new(files, owner, make, self)?;
         let mut all = lock(&self.live);
         all.retain(|other| other.strong_count() > 0);
         all.push(live.as_replaceable());

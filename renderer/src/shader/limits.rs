@@ -57,7 +57,7 @@ pub(super) fn check(source: &Source, words: &[u32], limits: &Limits) -> Result<O
                 written(sides),
                 written(group)
             );
-            faults.push(fault(source, &["local_size"], message));
+            faults.push(ShaderFault::at(source, &["local_size"], message));
         }
     }
     let shared = || taken.variables.iter().filter(|(class, ..)| *class == SHARED);
@@ -67,14 +67,14 @@ pub(super) fn check(source: &Source, words: &[u32], limits: &Limits) -> Result<O
     {
         let most = limits.max_shared_bytes;
         let message = format!("shared memory: this device allows {most} bytes a workgroup, found {bytes}");
-        faults.push(fault(source, &["shared", name], message));
+        faults.push(ShaderFault::at(source, &["shared", name], message));
     }
     let own = taken.variables.iter().filter(|(class, _, bytes)| *class != SHARED && *bytes > MOST_OWN_BYTES);
     faults.extend(own.map(|(_, name, bytes)| {
         let message = format!(
             "variable '{name}': expected at most {MOST_OWN_BYTES} bytes that each invocation has of its own, found {bytes}"
         );
-        fault(source, &[name], message)
+        ShaderFault::at(source, &[name], message)
     }));
     if faults.is_empty() { Ok(taken.group) } else { Err(refuse(source, faults)) }
 }
@@ -86,7 +86,7 @@ pub(super) fn check(source: &Source, words: &[u32], limits: &Limits) -> Result<O
 pub(super) fn check_dispatched(source: &Source, found: Option<GroupSize>, expected: GroupSize) -> Result<()> {
     let Some(found) = found.filter(|found| *found != expected) else { return Ok(()) };
     let message = format!("workgroup size: the host expects {}, found {}", written(expected), written(found));
-    Err(refuse(source, vec![fault(source, &["local_size"], message)]))
+    Err(refuse(source, vec![ShaderFault::at(source, &["local_size"], message)]))
 }
 
 fn written([x, y, z]: GroupSize) -> String {
@@ -95,27 +95,6 @@ fn written([x, y, z]: GroupSize) -> String {
 
 fn refuse(source: &Source, faults: Vec<ShaderFault>) -> RendererError {
     RendererError::Compile { file: source.file.clone(), faults }
-}
-
-/// A fault at the first line that holds all of these words, in the main file if it can be.
-fn fault(source: &Source, words: &[&str], message: String) -> ShaderFault {
-    let holds = |line: &str| words.iter().all(|word| !word.is_empty() && line.contains(word));
-    let main = source.texts.get_key_value(&source.file);
-    let found = main.into_iter().chain(&source.texts).find_map(|(file, text)| {
-        let (index, line) = text.lines().enumerate().find(|(_, line)| holds(line))?;
-        Some((file, index, line))
-    });
-    match found {
-        Some((file, index, line)) => ShaderFault {
-            file: file.clone(),
-            line: u32::try_from(index + 1).ok(),
-            column: None,
-            message,
-            source_line: Some(line.to_owned()),
-            more: 0,
-        },
-        None => ShaderFault::whole(&source.file, message),
-    }
 }
 
 impl Taken {
@@ -210,20 +189,20 @@ mod tests {
                 "",
                 "local_size_x = 32, local_size_y = 16",
                 "",
-                "a.comp:3: workgroup size: this device allows 256 invocations, at most 256 x 256 x 32 along the axes, found 32 x 16 x 1 (512)",
+                "a.comp:3:8: workgroup size: this device allows 256 invocations, at most 256 x 256 x 32 along the axes, found 32 x 16 x 1 (512)",
             ),
             ("", "local_size_z = 48", "", "found 1 x 1 x 48 (48)"),
             (
                 shared,
                 size,
                 uses,
-                "a.comp:3: shared memory: this device allows 1024 bytes a workgroup, found 7264",
+                "a.comp:4:1: shared memory: this device allows 1024 bytes a workgroup, found 7264",
             ),
             (
                 "",
                 size,
                 big,
-                "a.comp:5: variable 'big': expected at most 524288 bytes that each invocation has of its own, found 400000000",
+                "a.comp:5:5: variable 'big': expected at most 524288 bytes that each invocation has of its own, found 400000000",
             ),
         ] {
             let said = checked(head, size, body).unwrap_err();

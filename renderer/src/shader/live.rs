@@ -4,10 +4,10 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 
-use caustica_gpu::{Bind, BindSort, Binding};
+use caustica_gpu::{Bind, BindSort, Binding, BindingKind};
 
-use super::library::{Compiled, lock};
-use crate::error::{RendererError, Result};
+use super::library::{Compiled, ShaderLibrary, lock};
+use crate::error::Result;
 
 /// Gives the stage of a main file.
 pub(crate) type StageOf<'a> = &'a dyn Fn(&str) -> Result<Arc<Compiled>>;
@@ -59,9 +59,10 @@ pub(crate) struct Live<P>(Arc<Slot<P>>);
 
 struct Slot<P> {
     files: Vec<&'static str>,
+    library: Weak<ShaderLibrary>,
     owner: Arc<Owner>,
     make: Make<P>,
-    current: Mutex<(Arc<P>, Vec<Arc<Compiled>>)>,
+    current: Mutex<Current<P>>,
     /// What the host binds, once it has.
     offered: OnceLock<Vec<(String, BindSort)>>,
 }
@@ -81,11 +82,20 @@ impl<P: Send + Sync + 'static> Live<P> {
         files: &[&'static str],
         owner: &Arc<Owner>,
         make: Make<P>,
-        stage: StageOf<'_>,
+        library: &Arc<ShaderLibrary>,
     ) -> Result<Self> {
-        let current = Mutex::new((Arc::new(make(stage)?), stages_of(files, stage)?));
-        let owner = Arc::clone(owner);
-        Ok(Self(Arc::new(Slot { files: files.to_vec(), owner, make, current, offered: OnceLock::new() })))
+        let made = made(files, &make, library).or_else(|error| {
+            library.fall_back(files, error)?;
+            made(files, &make, library)
+        });
+        Ok(Self(Arc::new(Slot {
+            files: files.to_vec(),
+            library: Arc::downgrade(library),
+            owner: Arc::clone(owner),
+            make,
+            current: Mutex::new(made?),
+            offered: OnceLock::new(),
+        })))
     }
 
     pub(super) fn as_replaceable(&self) -> Weak<dyn Replaceable> {
@@ -94,16 +104,41 @@ impl<P: Send + Sync + 'static> Live<P> {
     }
 
     /// The pipeline to record with. `binds`: what the host gives it, the same every time.
-    pub(crate) fn get(&self, binds: &[(&str, Bind<'_>)]) -> Arc<P> {
-        self.0
-            .offered
-            .get_or_init(|| binds.iter().map(|(name, bind)| ((*name).to_owned(), bind.sort())).collect());
-        Arc::clone(&lock(&self.0.current).0)
+    ///
+    /// # Errors
+    /// At the first call, where the shaders bind something else and are not edited.
+    pub(crate) fn get(&self, binds: &[(&str, Bind<'_>)]) -> Result<Arc<P>> {
+        if self.0.offered.get().is_none() {
+            let offered = || binds.iter().map(|(name, bind)| ((*name).to_owned(), bind.sort())).collect();
+            self.0.hold_against(self.0.offered.get_or_init(offered))?;
+        }
+        Ok(Arc::clone(&lock(&self.0.current).0))
     }
+}
+
+type Current<P> = (Arc<P>, Vec<Arc<Compiled>>);
+
+fn made<P>(files: &[&'static str], make: &Make<P>, library: &ShaderLibrary) -> Result<Current<P>> {
+    let stage = |file: &str| library.stage(file);
+    Ok((Arc::new(make(&stage)?), stages_of(files, &stage)?))
 }
 
 fn stages_of(files: &[&'static str], stage: StageOf<'_>) -> Result<Vec<Arc<Compiled>>> {
     files.iter().map(|file| stage(file)).collect()
+}
+
+impl<P> Slot<P> {
+    /// Before it is used: built-in shaders take the place of those that bind what the host does not give.
+    fn hold_against(&self, offered: &[(String, BindSort)]) -> Result<()> {
+        let stages = lock(&self.current).1.clone();
+        let Err(error) = stages.iter().try_for_each(|stage| check_offered(stage, offered)) else {
+            return Ok(());
+        };
+        let Some(library) = self.library.upgrade() else { return Err(error) };
+        library.fall_back(&self.files, error)?;
+        *lock(&self.current) = made(&self.files, &self.make, &library)?;
+        Ok(())
+    }
 }
 
 impl<P: Send + Sync + 'static> Replaceable for Slot<P> {
@@ -149,14 +184,14 @@ fn check_known(stage: &Compiled, before: &[Arc<Compiled>]) -> Result<()> {
         new.name,
         known.join(", ")
     );
-    Err(RendererError::Interface { file: stage.file().to_owned(), reason })
+    Err(stage.refuse(&new.name, reason))
 }
 
 /// Whether the host gives everything that a stage binds.
 fn check_offered(stage: &Compiled, offered: &[(String, BindSort)]) -> Result<()> {
-    let refuse = |reason: String| Err(RendererError::Interface { file: stage.file().to_owned(), reason });
     for binding in &stage.interface.bindings {
         let name = &binding.name;
+        let refuse = |reason: String| Err(stage.refuse(name, reason));
         let Some((_, sort)) = offered.iter().find(|(known, _)| known == name) else {
             let known: Vec<&str> = offered.iter().map(|(known, _)| known.as_str()).collect();
             let expected = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
@@ -174,6 +209,12 @@ fn check_offered(stage: &Compiled, offered: &[(String, BindSort)]) -> Result<()>
             && *given != declared
         {
             return refuse(format!("binding '{name}': expected an image of {given:?}, found {declared:?}"));
+        }
+        if let (BindSort::Image(given), BindingKind::SampledImage) = (sort, binding.kind)
+            && given.is_uint() != binding.reads_uint
+        {
+            let kind = if given.is_uint() { "utexture2D" } else { "texture2D" };
+            return refuse(format!("binding '{name}': expected a {kind}, as the host gives {given:?}"));
         }
     }
     Ok(())

@@ -8,7 +8,7 @@ use caustica_gpu::MAX_LINKED_PAYLOAD;
 use super::constants::Constants;
 use super::library::Compiled;
 use super::spirv::{instructions, text_of};
-use crate::error::{RendererError, Result};
+use crate::error::Result;
 
 /// The attribute of a hit on a triangle (VK_KHR_ray_tracing_pipeline).
 const BARYCENTRIC: &str = "float32x2";
@@ -90,15 +90,13 @@ fn bytes_of(ty: &str) -> u32 {
 /// # Errors
 /// [`RendererError::Interface`] naming both stages: expected against found.
 pub(crate) fn check_payloads(generation: &Compiled, others: &[&Compiled]) -> Result<()> {
-    let refuse = |stage: &Compiled, reason: String| {
-        Err(RendererError::Interface { file: stage.file().to_owned(), reason })
-    };
+    let refuse = |stage: &Compiled, word: &str, reason: String| Err(stage.refuse(word, reason));
     if let Some((name, ty)) = generation.rays.sent.iter().find(|(_, ty)| bytes_of(ty) > MAX_LINKED_PAYLOAD) {
         let reason = format!(
             "ray payload {name}: expected at most {MAX_LINKED_PAYLOAD} bytes, found {}",
             bytes_of(ty)
         );
-        return refuse(generation, reason);
+        return refuse(generation, "rayPayloadEXT", reason);
     }
     let is_shadow = |stage: &Compiled| stage.name().starts_with("shadow");
     for shadow in [false, true] {
@@ -108,7 +106,11 @@ pub(crate) fn check_payloads(generation: &Compiled, others: &[&Compiled]) -> Res
         let first = || received().next().map(|(stage, (_, ty))| (stage.file(), ty));
         let Some((from, expected)) = sent.map(|ty| (generation.file(), ty)).or_else(first) else { continue };
         if let Some((stage, (_, found))) = received().find(|(_, (_, found))| found != expected) {
-            return refuse(stage, format!("ray payload: expected {expected}, as in {from}, found {found}"));
+            return refuse(
+                stage,
+                "rayPayloadInEXT",
+                format!("ray payload: expected {expected}, as in {from}, found {found}"),
+            );
         }
     }
     // Shapes hand over what their intersection shader writes, if anything.
@@ -121,7 +123,11 @@ pub(crate) fn check_payloads(generation: &Compiled, others: &[&Compiled]) -> Res
             _ => BARYCENTRIC,
         };
         if let Some(found) = stage.rays.attribute.as_ref().filter(|found| *found != expected) {
-            return refuse(stage, format!("hit attribute: expected {expected}, found {found}"));
+            return refuse(
+                stage,
+                "hitAttributeEXT",
+                format!("hit attribute: expected {expected}, found {found}"),
+            );
         }
     }
     Ok(())

@@ -4,8 +4,8 @@
 
 use caustica_gpu::{Access, Binding, BindingKind, Format, Interface};
 use spirq::ReflectConfig;
-use spirq::spirv::ImageFormat;
-use spirq::ty::{AccessType, DescriptorType, Type};
+use spirq::spirv::{Dim, ImageFormat};
+use spirq::ty::{AccessType, DescriptorType, ScalarType, Type};
 use spirq::var::Variable;
 
 use super::constants::with_plain_constants;
@@ -16,6 +16,21 @@ use crate::error::{RendererError, Result};
 pub struct Reflection {
     /// What it binds.
     pub interface: Interface,
+    /// What the stage before hands over.
+    pub inputs: Vec<Varying>,
+    /// What it hands over.
+    pub outputs: Vec<Varying>,
+}
+
+/// An input or output at a location.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Varying {
+    /// Name in GLSL.
+    pub name: String,
+    /// Its number.
+    pub location: u32,
+    /// Its type, written out.
+    pub ty: String,
 }
 
 /// Bindings of set 0: number, kind, and what it is.
@@ -39,24 +54,42 @@ pub fn reflect(file: &str, words: &[u32]) -> Result<Reflection> {
         .reflect()
         .map_err(|error| refuse(format!("reflection failed: {error}")))?;
     let entry = entry_points.first().ok_or_else(|| refuse(String::from("no entry point")))?;
-    let mut interface = Interface::default();
+    let mut found = Reflection::default();
+    let interface = &mut found.interface;
+    let varying = |name: &Option<String>, location: u32, ty: &Type| Varying {
+        name: name.clone().unwrap_or_default(),
+        location,
+        ty: ty.to_string(),
+    };
     for variable in &entry.vars {
         match variable {
-            Variable::Descriptor { name, desc_bind, desc_ty, ty, .. } => {
+            Variable::Descriptor { name, desc_bind, desc_ty, ty, nbind } => {
                 let name = name.clone().unwrap_or_default();
+                if !is_plain_image(ty) {
+                    return Err(refuse(format!("'{name}': expected a two-dimensional image, found {ty}")));
+                }
                 match desc_bind.set() {
                     0 => check_scene_binding(file, &name, desc_bind.bind(), desc_ty)?,
+                    1 if *nbind != 1 => {
+                        return Err(refuse(format!("'{name}': expected one, found an array of {nbind}")));
+                    }
                     1 => interface.bindings.push(Binding {
-                        kind: kind_of(desc_ty)
-                            .ok_or_else(|| refuse(format!("'{name}' is of an unknown kind")))?,
+                        kind: kind_of(desc_ty).ok_or_else(|| {
+                            refuse(format!("'{name}': a kind that the host never gives, {ty}"))
+                        })?,
                         binding: desc_bind.bind(),
-                        format: format_of(ty),
+                        format: format_of(ty).map_err(|found| {
+                            refuse(format!("'{name}': the host has no images of format {found}"))
+                        })?,
+                        reads_uint: reads_uint(ty),
                         name,
                     }),
                     set => return Err(refuse(format!("'{name}' is in set {set}; only 0 and 1 exist"))),
                 }
                 interface.uses_scene |= desc_bind.set() == 0;
             }
+            Variable::Input { name, location, ty } => found.inputs.push(varying(name, location.loc(), ty)),
+            Variable::Output { name, location, ty } => found.outputs.push(varying(name, location.loc(), ty)),
             Variable::PushConstant { ty, .. } => {
                 interface.push_bytes = ty.nbyte().unwrap_or(size_of::<crate::gpu_types::Push>()) as u32;
             }
@@ -69,7 +102,36 @@ pub fn reflect(file: &str, words: &[u32]) -> Result<Reflection> {
         return Err(refuse(format!("push constants: expected at most {expected} bytes, found {found}")));
     }
     interface.bindings.sort_by_key(|binding| binding.binding);
-    Ok(Reflection { interface })
+    let twice = interface.bindings.windows(2).find(|pair| pair[0].binding == pair[1].binding);
+    if let Some([one, other]) = twice {
+        let number = one.binding;
+        return Err(refuse(format!("'{}': binding {number} is that of '{}' already", other.name, one.name)));
+    }
+    Ok(found)
+}
+
+/// Whether it is a two-dimensional image with one layer and one sample, as all are that the host gives, or none.
+fn is_plain_image(ty: &Type) -> bool {
+    let (dim, is_array, is_multisampled) = match ty {
+        Type::SampledImage(image) => (image.dim, image.is_array, image.is_multisampled),
+        Type::CombinedImageSampler(both) => {
+            let image = &both.sampled_image_ty;
+            (image.dim, image.is_array, image.is_multisampled)
+        }
+        Type::StorageImage(image) => (image.dim, image.is_array, image.is_multisampled),
+        _ => return true,
+    };
+    dim == Dim::Dim2D && !is_array && !is_multisampled
+}
+
+/// Whether a sampled image is one of unsigned integers.
+fn reads_uint(ty: &Type) -> bool {
+    let scalar = match ty {
+        Type::SampledImage(image) => &image.scalar_ty,
+        Type::CombinedImageSampler(both) => &both.sampled_image_ty.scalar_ty,
+        _ => return false,
+    };
+    matches!(scalar, ScalarType::Integer { is_signed: false, .. })
 }
 
 fn check_scene_binding(file: &str, name: &str, binding: u32, found: &DescriptorType) -> Result<()> {
@@ -83,10 +145,10 @@ fn check_scene_binding(file: &str, name: &str, binding: u32, found: &DescriptorT
     Err(RendererError::Interface { file: file.to_owned(), reason })
 }
 
-/// The format that a storage image is declared with.
-fn format_of(ty: &Type) -> Option<Format> {
-    let Type::StorageImage(image) = ty else { return None };
-    Some(match image.fmt {
+/// The format that a storage image is declared with, if it is one; else the one that the host has none of.
+fn format_of(ty: &Type) -> std::result::Result<Option<Format>, String> {
+    let Type::StorageImage(image) = ty else { return Ok(None) };
+    Ok(Some(match image.fmt {
         ImageFormat::Rgba8 => Format::Rgba8Unorm,
         ImageFormat::Rgba16f => Format::Rgba16Float,
         ImageFormat::Rgba32f => Format::Rgba32Float,
@@ -96,8 +158,8 @@ fn format_of(ty: &Type) -> Option<Format> {
         ImageFormat::Rg32ui => Format::Rg32Uint,
         ImageFormat::Rgba32ui => Format::Rgba32Uint,
         ImageFormat::R32ui => Format::R32Uint,
-        _ => return None,
-    })
+        other => return Err(format!("{other:?}")),
+    }))
 }
 
 fn kind_of(descriptor: &DescriptorType) -> Option<BindingKind> {

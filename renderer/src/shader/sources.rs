@@ -86,8 +86,9 @@ impl ShaderSources {
     /// [`RendererError::Source`] when it is missing, unreadable or outside of the folder.
     pub fn read(&self, file: &str) -> Result<String> {
         let refuse = |reason: String| RendererError::Source { file: file.to_owned(), reason };
-        if file.split('/').any(|part| part == ".." || part.is_empty()) {
-            return Err(refuse(String::from("a shader path must stay inside the shader folder")));
+        if file.split('/').any(|part| matches!(part, "" | "." | "..")) {
+            let reason = "a path leads from the folder of the shaders down, without '.', '..' or empty parts";
+            return Err(refuse(reason.to_owned()));
         }
         match &self.folder {
             Some(folder) => {

@@ -42,6 +42,8 @@ enum Signal {
     Renamed {
         folder: bool,
     },
+    /// The system does not tell of everything any more, for this reason.
+    Failed(String),
     End,
 }
 
@@ -54,6 +56,8 @@ struct Guard<F> {
     how: Arc<Mutex<Watching>>,
     signals: Sender<Signal>,
     places: Places,
+    /// Links to files, and what they lead to.
+    files: Files,
     watcher: Watched,
 }
 
@@ -67,7 +71,8 @@ impl Watch {
         let (how, watcher) = watched(folder, &changed, &signals);
         let how = Arc::new(Mutex::new(how));
         let (folder, shared) = (folder.to_owned(), Arc::clone(&how));
-        let guard = Guard { folder, changed, how: shared, signals: signals.clone(), places, watcher };
+        let files = linked_files(&places);
+        let guard = Guard { folder, changed, how: shared, signals: signals.clone(), places, files, watcher };
         let thread = std::thread::Builder::new().name("shader folder".to_owned());
         let thread = thread.spawn(move || guard.run(&inbox));
         let thread = thread.inspect_err(|error| tracing::warn!("shaders are not watched: {error}")).ok();
@@ -99,12 +104,38 @@ impl<F: Fn(Vec<PathBuf>) + Clone + Send + Sync + 'static> Guard<F> {
             for signal in first.into_iter().chain(inbox.try_iter()) {
                 match signal {
                     Signal::Renamed { folder } => (is_another, is_due) = (is_another || folder, true),
+                    Signal::Failed(reason) => self.poll(reason),
                     Signal::End => return,
                 }
             }
             if is_another || is_due && self.places != places(&self.folder) {
                 self.watch_again();
             }
+            self.look_behind_links(is_due);
+        }
+    }
+
+    /// Where a link leads to a file, the system tells of the link alone.
+    fn look_behind_links(&mut self, may_be_others: bool) {
+        let now = match may_be_others {
+            true => linked_files(&self.places),
+            false => self.files.keys().map(|link| (link.clone(), stamp(link))).collect(),
+        };
+        let is_another =
+            |(link, stamp): (&PathBuf, &Stamp)| self.files.get(link).is_some_and(|old| old != stamp);
+        let changed: Vec<PathBuf> =
+            now.iter().filter(|entry| is_another(*entry)).map(|(link, _)| link.clone()).collect();
+        self.files = now;
+        if !changed.is_empty() {
+            (self.changed)(changed);
+        }
+    }
+
+    /// Looks at the files again and again from now on.
+    fn poll(&mut self, reason: String) {
+        if *lock(&self.how) == Watching::Told {
+            let handler = handler(self.folder.clone(), self.changed.clone(), self.signals.clone());
+            (*lock(&self.how), self.watcher) = polled(&self.folder, handler, reason);
         }
     }
 
@@ -112,6 +143,7 @@ impl<F: Fn(Vec<PathBuf>) + Clone + Send + Sync + 'static> Guard<F> {
     fn watch_again(&mut self) {
         let folder = self.folder.display();
         self.places = places(&self.folder);
+        self.files = linked_files(&self.places);
         if self.places.values().next().is_some_and(Option::is_some) {
             let (how, watcher) = watched(&self.folder, &self.changed, &self.signals);
             tracing::warn!("{folder}: another folder is there now, or below it; it is watched from now on");
@@ -147,6 +179,36 @@ fn number_of(about: &std::fs::Metadata) -> u64 {
 #[cfg(not(unix))]
 fn number_of(_: &std::fs::Metadata) -> u64 {
     0
+}
+
+/// What a link to a file leads to: where that is, when it was written, and its length.
+type Stamp = Option<(PathBuf, SystemTime, u64)>;
+type Files = BTreeMap<PathBuf, Stamp>;
+
+fn stamp(link: &Path) -> Stamp {
+    let about = std::fs::metadata(link).ok().filter(std::fs::Metadata::is_file)?;
+    Some((link.canonicalize().ok()?, about.modified().ok()?, about.len()))
+}
+
+/// The links to files in the watched folders.
+fn linked_files(places: &Places) -> Files {
+    let mut files = Files::new();
+    let mut seen = BTreeSet::new();
+    let mut waiting: Vec<PathBuf> = places.keys().cloned().collect();
+    while let Some(next) = waiting.pop() {
+        if !next.canonicalize().is_ok_and(|real| seen.insert(real)) {
+            continue;
+        }
+        for entry in std::fs::read_dir(&next).into_iter().flatten().flatten() {
+            let (path, kind) = (entry.path(), entry.file_type().ok());
+            if kind.is_some_and(|kind| kind.is_dir()) {
+                waiting.push(path);
+            } else if kind.is_some_and(|kind| kind.is_symlink()) && path.is_file() {
+                files.insert(path.clone(), stamp(&path));
+            }
+        }
+    }
+    files
 }
 
 fn places(folder: &Path) -> Places {
@@ -229,7 +291,7 @@ fn handler(
             changed(event.paths);
         }
         Err(error) => {
-            tracing::warn!("watching the shaders: {error}");
+            let _ = signals.send(Signal::Failed(error.to_string()));
             changed(Vec::new());
         }
     }
@@ -288,6 +350,28 @@ mod tests {
             }
         }
         false
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_a_link_leads_to_is_watched_and_a_watcher_that_fails_is_replaced() {
+        let above = tempfile::tempdir().unwrap();
+        let (folder, outside) = (above.path().join("shaders"), above.path().join("outside.glsl"));
+        fs::create_dir(&folder).unwrap();
+        fs::write(&outside, "1").unwrap();
+        let link = folder.join("a.glsl");
+        std::os::unix::fs::symlink(&outside, &link).unwrap();
+        let (sender, changes) = channel();
+        let watch = Watch::start(&folder, move |files| {
+            let _ = sender.send(files);
+        });
+        fs::write(&outside, "22").unwrap();
+        assert_eq!(changes.recv_timeout(PATIENCE).unwrap(), [link]);
+        watch.signals.send(Signal::Failed("no more of them".to_owned())).unwrap();
+        while watch.how() == Watching::Told {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert!(is_noticed(&folder.join("b.glsl"), &changes), "{:?}", watch.how());
     }
 
     #[cfg(unix)]

@@ -50,8 +50,10 @@ pub(super) fn follow(
             }
             files = Files::of(session, &args.shot.file);
         }
-        if is_due && is_open {
-            picture(session, start.elapsed())?;
+        match (is_due, is_open) {
+            (true, true) => picture(session, start.elapsed())?,
+            (true, false) => eprintln!("the shaders are taken over; the picture waits for the scene"),
+            (false, _) => {}
         }
     }
 }

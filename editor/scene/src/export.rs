@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::assets::{Environment, ShapeSource};
+use crate::assets::{Environment, MAX_RADIANCE, ShapeSource};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId};
 use crate::import::{Warning, counted, plain, short};
@@ -207,7 +207,13 @@ impl<'a> Writer<'a> {
         let places: BTreeMap<MeshKey, usize> = keys.iter().map(|key| (*key).clone()).zip(0..).collect();
         let skin_places = animation::skin_places(self.document, &tree);
         let mut nodes = self.nodes(&tree, &sources, &places, &skin_places);
-        let skins = animation::skins(&skin_places, &tree, &sources, &mut self.buffer, &mut self.used);
+        let skins = animation::skins(
+            &skin_places,
+            &tree,
+            &sources,
+            (&mut self.buffer, &mut nodes.list),
+            &mut self.used,
+        );
         let mut of_mesh: BTreeMap<MeshId, Vec<usize>> = BTreeMap::new();
         for (key, place) in &places {
             of_mesh.entry(key.mesh).or_default().push(*place);
@@ -288,6 +294,12 @@ impl<'a> Writer<'a> {
             let color = material.base_color;
             if color.max_element() > 1.0 || color.min_element() < 0.0 {
                 let reason = format!("its base colour {color} is held to 0 to 1, as glTF wants it");
+                self.warn(&format!("material \"{}\"", short(&material.name)), reason);
+            }
+            let brightest = material.emissive.max_element().max(1.0) * material.emissive_strength;
+            if brightest > MAX_RADIANCE {
+                let reason =
+                    format!("its emission of {brightest} is held to {MAX_RADIANCE}, which is read again");
                 self.warn(&format!("material \"{}\"", short(&material.name)), reason);
             }
         }

@@ -32,7 +32,7 @@ pub(super) fn skins(
     places: &BTreeMap<(NodeId, u32), usize>,
     tree: &Tree,
     sources: &Sources<'_>,
-    buffer: &mut Buffer,
+    (buffer, nodes): (&mut Buffer, &mut Vec<Value>),
     used: &mut Extensions,
 ) -> Vec<Value> {
     let mut in_order: Vec<(usize, (NodeId, u32))> =
@@ -47,7 +47,12 @@ pub(super) fn skins(
         let mut object = Object::new();
         let kept = prefab.foreign.skins.get(&(number as usize));
         object.put_text("name", kept.map_or("", |kept| &kept.name));
-        write_skin(&mut object, skin, node, tree, buffer);
+        let matrices: Vec<[f32; 16]> =
+            skin.inverse_bind.iter().map(|m| glam::DMat4::from(*m).as_mat4().to_cols_array()).collect();
+        object.put("inverseBindMatrices", buffer.floats(&matrices, false, Use::Other));
+        let joints =
+            skin.joints.iter().filter_map(|&part| tree.places.get(&Target::part(node, part)).copied());
+        object.put("joints", apart(joints, nodes));
         let skeleton = kept.and_then(|kept| tree.places.get(&Target::part(node, kept.skeleton?)));
         if let Some(skeleton) = skeleton {
             object.put("skeleton", *skeleton);
@@ -58,12 +63,24 @@ pub(super) fn skins(
     list
 }
 
-fn write_skin(object: &mut Object, skin: &Skin, node: NodeId, tree: &Tree, buffer: &mut Buffer) {
-    let matrices: Vec<[f32; 16]> =
-        skin.inverse_bind.iter().map(|matrix| glam::DMat4::from(*matrix).as_mat4().to_cols_array()).collect();
-    object.put("inverseBindMatrices", buffer.floats(&matrices, false, Use::Other));
-    let place = |&part: &u32| tree.places.get(&Target::part(node, part)).copied();
-    object.put("joints", skin.joints.iter().filter_map(place).collect::<Vec<_>>());
+/// The joints of a skin, each once: for one that is there twice a node below it, which lies as it does.
+fn apart(joints: impl Iterator<Item = usize>, nodes: &mut Vec<Value>) -> Vec<usize> {
+    let mut seen = BTreeSet::new();
+    let mut one = |joint: usize| {
+        if seen.insert(joint) {
+            return joint;
+        }
+        let twin = nodes.len();
+        if let Some(node) = nodes.get_mut(joint).and_then(Value::as_object_mut) {
+            let children = node.entry("children").or_insert_with(|| Value::Array(Vec::new()));
+            children.as_array_mut().into_iter().for_each(|children| children.push(twin.into()));
+        }
+        let mut object = Object::new();
+        object.put("name", format!("joint {joint} again"));
+        nodes.push(Value::Object(object));
+        twin
+    };
+    joints.map(&mut one).collect()
 }
 
 /// Parts of an instance whose transforms clips move.

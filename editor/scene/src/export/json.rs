@@ -8,10 +8,17 @@ use serde_json::{Map, Value};
 /// A JSON object; members keep the order in which they are put.
 pub(super) type Object = Map<String, Value>;
 
-/// The shortest number that is read back as the same single-precision number.
+/// The shortest number that is read back as the same single-precision number. What is too large is the largest: JSON has no
+/// word for more, and `null` is no number.
 pub(super) fn number(value: f32) -> Value {
+    let value = value.clamp(f32::MIN, f32::MAX);
     let short = value.to_string().parse::<f64>().ok().filter(|&short| short as f32 == value);
     Value::from(short.unwrap_or_else(|| f64::from(value)))
+}
+
+/// A number of double precision, likewise.
+pub(super) fn wide(value: f64) -> Value {
+    Value::from(value.clamp(f64::MIN, f64::MAX))
 }
 
 /// An array of single-precision numbers.
@@ -150,5 +157,7 @@ mod tests {
             let back = number(value).as_f64().map(|number| number as f32);
             assert!(!value.is_finite() || back.map(f32::to_bits) == Some(bits), "{value} {back:?}");
         }
+        assert_eq!(number(f32::INFINITY), number(f32::MAX));
+        assert_eq!(wide(f64::NEG_INFINITY), Value::from(f64::MIN));
     }
 }

@@ -7,7 +7,7 @@ use glam::{Vec3, Vec4};
 use super::foreign::Sources;
 use super::json::{Extensions, Object, Put, number, numbers};
 use super::texture::Textures;
-use crate::assets::{AlphaMode, Material, ShadingMode, SpecularGlossiness, TextureUse};
+use crate::assets::{AlphaMode, MAX_RADIANCE, Material, ShadingMode, SpecularGlossiness, TextureUse};
 use crate::import::gltf::{INFINITE_IOR, is_smooth_glass};
 
 mod lobes;
@@ -181,6 +181,7 @@ fn as_shown(source: &Material) -> Material {
         material.emissive /= brightest;
         material.emissive_strength *= brightest;
     }
+    material.emissive_strength = material.emissive_strength.min(MAX_RADIANCE);
     material
 }
 

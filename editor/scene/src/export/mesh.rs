@@ -168,8 +168,12 @@ impl MeshWriter<'_> {
         let mut list: Vec<Value> = primitives.into_values().map(Value::Object).collect();
         let loose = self.sources.loose(key.mesh).filter(|_| key.loose);
         if let Some((id, prefab, loose)) = loose {
-            let written = loose.primitives.iter().zip(used_count..);
-            list.extend(written.map(|(loose, set)| Value::Object(self.loose(id, prefab, loose, set))));
+            // All primitives have as many targets.
+            let own = loose.primitives.iter().map(|loose| loose.targets.len()).max();
+            let targets = if list.is_empty() { own.unwrap_or(0) } else { mesh.data.morph.len() };
+            for (loose, set) in loose.primitives.iter().zip(used_count..) {
+                list.push(Value::Object(self.loose((id, prefab), loose, set, targets)));
+            }
         }
         let mut object = Object::new();
         object.put_text("name", &mesh.name);
@@ -182,8 +186,14 @@ impl MeshWriter<'_> {
         (object, own_extras(&mesh.data))
     }
 
-    /// Points or lines, as they were read.
-    fn loose(&mut self, id: PrefabId, prefab: &Prefab, loose: &Loose, set: usize) -> Object {
+    /// Points or lines, as they were read, with so many targets.
+    fn loose(
+        &mut self,
+        (id, prefab): (PrefabId, &Prefab),
+        loose: &Loose,
+        set: usize,
+        targets: usize,
+    ) -> Object {
         let usage = Use::Vertices { set };
         let mut attributes = |list: &[(String, Numbers)]| {
             let mut object = Object::new();
@@ -197,7 +207,17 @@ impl MeshWriter<'_> {
         };
         let mut object = Object::new();
         object.put("attributes", attributes(&loose.attributes));
-        let targets: Vec<Value> = loose.targets.iter().map(|t| Value::Object(attributes(t))).collect();
+        let own = loose.targets.iter().take(targets);
+        let mut list: Vec<Value> = own.map(|target| Value::Object(attributes(target))).collect();
+        let count = loose.attributes.first().map_or(0, |(_, numbers)| numbers.count);
+        let is_empty = |target: &Value| target.as_object().is_some_and(Object::is_empty);
+        if list.len() < targets || list.iter().any(is_empty) {
+            let mut nothing = Object::new();
+            nothing.put("POSITION", self.buffer.zeros::<3>(count, true));
+            let nothing = Value::Object(nothing);
+            list.iter_mut().filter(|target| is_empty(target)).for_each(|target| *target = nothing.clone());
+            list.resize(targets, nothing);
+        }
         if let Some(indices) = &loose.indices {
             object.put("indices", self.buffer.numbers(indices, false, Use::Indices));
         }
@@ -206,7 +226,7 @@ impl MeshWriter<'_> {
             object.put("material", *place);
         }
         object.put("mode", loose.mode);
-        object.put_filled("targets", targets);
+        object.put_filled("targets", list);
         if !loose.mappings.is_empty() {
             self.sources.put_mappings((id, &loose.mappings), &mut object, self.materials, self.used);
         }

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::buffer::{Buffer, Use};
 use super::foreign::Sources;
-use super::json::{Extensions, Object, Pool, Put, number, numbers};
+use super::json::{Extensions, Object, Pool, Put, number, numbers, wide};
 use super::mesh::MeshKey;
 use super::shear;
 use super::tree::{Entry, Stands, Tree, local_of, single_precision};
@@ -85,6 +85,9 @@ impl NodeWriter<'_> {
         let prefab = self.document.prefab_of(target.node);
         let unknown = target.part.zip(prefab).and_then(|(part, prefab)| self.sources.part(prefab, part));
         if let Some(light) = self.document.light_of(target) {
+            if !light.radiant().is_finite() {
+                self.warn(target, "its light is held to the largest number that there is");
+            }
             // Sizes in the node's own extras would be read where the light has none.
             let speaks = unknown.is_some_and(|(_, unknown)| unknown.extras.is_some());
             let mut value = Object::new();
@@ -182,10 +185,11 @@ impl NodeWriter<'_> {
 
     fn instance_attributes(&mut self, instances: &[Target]) -> Object {
         let trs = |target: &Target| self.document.local(*target).unwrap_or_default().nearest_trs();
+        let most = DVec3::splat(f32::MAX.into());
+        let single = |v: DVec3| v.clamp(-most, most).as_vec3().to_array();
         let list: Vec<Trs> = instances.iter().map(trs).collect();
         let mut attributes = Object::new();
-        let translations: Vec<[f32; 3]> =
-            list.iter().map(|trs| trs.translation.as_vec3().to_array()).collect();
+        let translations: Vec<[f32; 3]> = list.iter().map(|trs| single(trs.translation)).collect();
         attributes.put("TRANSLATION", self.buffer.floats(&translations, false, Use::Other));
         if list.iter().any(|trs| trs.rotation != DQuat::IDENTITY) {
             let rotations: Vec<[f32; 4]> = list
@@ -195,7 +199,7 @@ impl NodeWriter<'_> {
             attributes.put("ROTATION", self.buffer.floats(&rotations, false, Use::Other));
         }
         if list.iter().any(|trs| trs.scale != DVec3::ONE) {
-            let scales: Vec<[f32; 3]> = list.iter().map(|trs| trs.scale.as_vec3().to_array()).collect();
+            let scales: Vec<[f32; 3]> = list.iter().map(|trs| single(trs.scale)).collect();
             attributes.put("SCALE", self.buffer.floats(&scales, false, Use::Other));
         }
         attributes
@@ -220,24 +224,24 @@ fn own_weights(document: &Document, target: Target) -> Option<Vec<f32>> {
 
 /// Translation, rotation and scale where they are read back to the bit, else a matrix.
 fn put_local(node: &mut Object, local: &Local) {
-    let wide = |values: &[f64]| -> Value { values.iter().copied().map(Value::from).collect() };
+    let all = |values: &[f64]| -> Value { values.iter().copied().map(wide).collect() };
     match local {
         Local::Trs(trs) if unit_rotation(trs.rotation) == Some(trs.rotation) => {
             if trs.translation != DVec3::ZERO {
-                node.put("translation", wide(&trs.translation.to_array()));
+                node.put("translation", all(&trs.translation.to_array()));
             }
             if trs.rotation != DQuat::IDENTITY {
-                node.put("rotation", wide(&trs.rotation.to_array()));
+                node.put("rotation", all(&trs.rotation.to_array()));
             }
             if trs.scale != DVec3::ONE {
-                node.put("scale", wide(&trs.scale.to_array()));
+                node.put("scale", all(&trs.scale.to_array()));
             }
         }
         other => {
             let affine = other.to_affine();
             let columns = [affine.x_axis, affine.y_axis, affine.z_axis].map(|axis| axis.extend(0.0));
-            let all = [columns[0], columns[1], columns[2], affine.translation.extend(1.0)];
-            node.put("matrix", wide(&all.map(|column| column.to_array()).concat()));
+            let columns = [columns[0], columns[1], columns[2], affine.translation.extend(1.0)];
+            node.put("matrix", all(&columns.map(|column| column.to_array()).concat()));
         }
     }
 }

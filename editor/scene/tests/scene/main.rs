@@ -20,6 +20,7 @@ mod edits;
 mod export;
 mod export_edits;
 mod export_materials;
+mod forbidden;
 mod gltf_file;
 mod hierarchy;
 mod import;

@@ -63,7 +63,7 @@ impl<'a> Variants<'a> {
         let is_read_so = self.list.iter().zip(&read_as).all(|((name, _), read_as)| name == read_as);
         let one = |(name, value): &(String, &Value)| {
             let mut value = (*value).clone();
-            if let Some(object) = value.as_object_mut().filter(|_| !is_read_so) {
+            if let Some(object) = value.as_object_mut().filter(|o| !is_read_so || !o.contains_key("name")) {
                 object.insert("name".to_owned(), name.as_str().into());
             }
             value

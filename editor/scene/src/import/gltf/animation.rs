@@ -15,6 +15,7 @@ use crate::foreign::KeptChannel;
 use crate::import::short;
 use crate::transform::Local;
 
+mod keys;
 mod pointer;
 
 /// Reads all animations in the order of the file.
@@ -75,7 +76,7 @@ impl Reader<'_> {
                 warnings.push(channel.fault("it has no target; it was left out"));
                 continue;
             };
-            match self.read_channel(sampler, &target)? {
+            match self.read_channel(sampler, &target, warnings)? {
                 // Nothing in the scene has what it changes.
                 Ok(read) if read.is_empty() => match self.unplayed(sampler, &target)? {
                     Some(unplayed) => {
@@ -144,6 +145,7 @@ impl Reader<'_> {
         &self,
         sampler: &Item<'_>,
         target: &Item<'_>,
+        warnings: &mut Vec<Fault>,
     ) -> Result<Result<Vec<Channel>, String>, Fault> {
         let targets = match self.targets(target)? {
             Ok(targets) => targets,
@@ -174,9 +176,12 @@ impl Reader<'_> {
             (Ok(times_s), Ok(values)) => (times_s, values),
             (Err(reason), _) | (_, Err(reason)) => return Ok(Err(reason)),
         };
-        let channel = Channel { part, path, interpolation, times_s, values };
+        let mut channel = Channel { part, path, interpolation, times_s, values };
         if let Err(reason) = sound(&channel, width) {
             return Ok(Err(reason));
+        }
+        for reason in keys::repair(&mut channel) {
+            warnings.push(sampler.fault(reason));
         }
         self.accessors.take(targets.len(), size_of::<Channel>(), target.place())?;
         // Another node of the same mesh, light or camera has the same widths.

@@ -131,7 +131,7 @@ impl<'a> AttributeReader<'a> {
         }
         self.accessors.take(count, size_of::<Hold>(), item.place())?;
         let mut holds = Vec::with_capacity(count);
-        let (mut repaired, mut cut, mut free) = (0_usize, 0_usize, 0_usize);
+        let (mut repaired, mut twice, mut cut, mut free) = (0_usize, 0_usize, 0_usize, 0_usize);
         let mut hold: Vec<(u32, f32)> = Vec::new();
         for vertex in 0..count {
             hold.clear();
@@ -142,12 +142,14 @@ impl<'a> AttributeReader<'a> {
                 let pairs = joints.iter().copied().zip(weights.iter().copied());
                 hold.extend(pairs.filter(|(_, weight)| weight.is_finite() && *weight > 0.0));
             }
+            twice += usize::from(merge_twins(&mut hold));
             cut += usize::from(hold.len() > 4);
             free += usize::from(hold.is_empty());
             holds.push(strongest(&mut hold));
         }
         for (number, what) in [
             (repaired, "weights are negative or not finite and count as 0"),
+            (twice, "vertices name a joint twice; its weights are added"),
             (cut, "vertices have more than 4 joints; the 4 strongest are kept"),
             (free, "vertices have no joint with a weight; they stay where they are"),
         ] {
@@ -256,6 +258,19 @@ fn key_of(base: &Item<'_>, targets: &[Item<'_>], sets: &[(String, String)]) -> R
     Ok(key)
 }
 
+/// Adds the weights of a joint that is named twice, in the place of the first; whether there was one.
+fn merge_twins(holds: &mut Vec<(u32, f32)>) -> bool {
+    let count = holds.len();
+    for at in (1..count).rev() {
+        let Some(&(joint, weight)) = holds.get(at) else { continue };
+        if let Some((_, sum)) = holds.iter_mut().take(at).find(|(other, _)| *other == joint) {
+            *sum = (*sum + weight).min(f32::MAX);
+            holds.remove(at);
+        }
+    }
+    holds.len() < count
+}
+
 /// At most four holds, their weights made a sum of 1; all zero when there are none.
 fn strongest(holds: &mut Vec<(u32, f32)>) -> Hold {
     // Stable, so that equally strong ones keep the order of the file.
@@ -282,6 +297,9 @@ mod tests {
         assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
         assert!((weights[0] - 0.4 / 0.9).abs() < 1e-6);
         assert_eq!(strongest(&mut vec![(3, 0.5)]), ([3, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]));
+        let mut twins = vec![(3, 0.25), (1, 0.25), (3, 0.5)];
+        assert!(merge_twins(&mut twins) && !merge_twins(&mut twins));
+        assert_eq!(twins, [(3, 0.75), (1, 0.25)]);
         assert_eq!(strongest(&mut Vec::new()), ([0; 4], [0.0; 4]));
         // The sum of the largest numbers is more than single precision holds.
         assert_eq!(strongest(&mut vec![(1, f32::MAX), (2, f32::MAX)]).1, [0.5, 0.5, 0.0, 0.0]);

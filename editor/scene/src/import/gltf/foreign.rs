@@ -14,6 +14,7 @@ use super::material::names_mode;
 use super::mesh::Meshes;
 use super::node::Tree;
 use crate::foreign::{Foreign, Kept, KeptSkin, Unknown};
+use crate::import::short;
 use crate::prefab::SourceScene;
 
 /// Extensions that hold indices of nodes, meshes, images, accessors or buffer views.
@@ -41,7 +42,10 @@ pub(super) fn read(
     let mut foreign = Foreign {
         file: unknown(root, &[]),
         variants: match root.extension("KHR_materials_variants")? {
-            Some(extension) => extension.objects("variants")?.iter().map(Item::value).cloned().collect(),
+            Some(extension) => {
+                let variants = extension.objects("variants")?;
+                variants.iter().map(|item| variant(item, &mut tree.warnings)).collect()
+            }
             None => Vec::new(),
         },
         instanced: std::mem::take(&mut tree.instanced),
@@ -104,6 +108,16 @@ pub(super) fn read(
     }
     count_pointing(root.value(), &mut foreign.lost);
     Ok(foreign)
+}
+
+/// A variant of materials as it stands; a name that is no text is left out.
+fn variant(item: &Item<'_>, warnings: &mut Vec<Fault>) -> Value {
+    let mut value = item.value().clone();
+    if let Err(fault) = item.text("name") {
+        warnings.push(Fault::new(fault.place, format!("{}; it is called by its number", fault.reason)));
+        value.as_object_mut().and_then(|members| members.shift_remove("name"));
+    }
+    value
 }
 
 /// The lists of lights and of cameras.
@@ -194,6 +208,7 @@ pub(super) fn unknown(item: &Item<'_>, read: &[&str]) -> Unknown {
 fn of_object(object: &Map<String, Value>, read: &[&str]) -> Unknown {
     let is_kept = |name: &str| !check::is_read(name) && !POINTING.contains(&name);
     let extensions = || object.get("extensions").and_then(Value::as_object).into_iter().flatten();
+    let extensions = || extensions().filter(|(_, value)| value.is_object());
     let known = extensions().filter(|(name, _)| check::is_read(name));
     let known = known.map(|(name, value)| (format!("extensions/{name}"), value));
     let members = object.iter().filter(|(name, _)| !["extras", "extensions"].contains(&name.as_str()));
@@ -234,7 +249,12 @@ fn count_pointing(value: &Value, lost: &mut BTreeMap<String, usize>) {
             Value::Object(members) => {
                 for (name, inner) in members.iter().filter(|(name, _)| *name != "extras") {
                     let pointing = name.as_str() == "extensions";
-                    for (name, _) in inner.as_object().filter(|_| pointing).into_iter().flatten() {
+                    for (name, value) in inner.as_object().filter(|_| pointing).into_iter().flatten() {
+                        if !value.is_object() {
+                            *lost
+                                .entry(format!("the extension {}, which is no object,", short(name)))
+                                .or_default() += 1;
+                        }
                         if POINTING.contains(&name.as_str()) {
                             *lost
                                 .entry(format!("{name}, which points into the lists of the file"))

@@ -192,8 +192,9 @@ impl Meshes {
             let material = primitive.index("material", materials, "material")?;
             self.uses_default_material |= material.is_none();
             made.material = MaterialId(material.unwrap_or(materials) as u64);
-            if let Some(extension) = primitive.extension("KHR_materials_variants")? {
-                self.variants.insert((number, place), read_mappings(&extension, materials)?);
+            let mappings = read_mappings(primitive, materials, &mut self.warnings)?;
+            if !mappings.is_empty() {
+                self.variants.insert((number, place), mappings);
             }
             let unknown = unknown(primitive, &[]);
             if !unknown.is_empty() {
@@ -207,7 +208,13 @@ impl Meshes {
         for primitive in &primitives {
             let mode = primitive.size("mode")?.unwrap_or(TRIANGLES);
             if mode < TRIANGLES {
-                loose.primitives.push(loose::read(primitive, accessors, mode, materials)?);
+                loose.primitives.extend(loose::read(
+                    primitive,
+                    accessors,
+                    mode,
+                    materials,
+                    &mut self.warnings,
+                )?);
             }
         }
         if !loose.primitives.is_empty() {
@@ -244,18 +251,34 @@ fn lost_attributes(primitive: &Item<'_>) -> Result<Vec<String>, Fault> {
     Ok(names.map(|name| format!("the attribute {name} of triangles")).collect())
 }
 
-/// What variants of materials choose for a primitive.
-pub(super) fn read_mappings(extension: &Item<'_>, materials: usize) -> Result<Vec<Mapping>, Fault> {
-    let mapping = |item: &Item<'_>| {
-        Ok(Mapping {
-            material: item.required_index("material", materials, "material")?,
-            // Checked with the other references.
-            variants: item.indices("variants", usize::MAX, "variant")?,
-            name: item.name()?,
-            unknown: unknown(item, &[]),
-        })
+/// What variants of materials choose for a primitive. A variant is named once: where it is named again, and what names
+/// none, is left out with a warning.
+pub(super) fn read_mappings(
+    primitive: &Item<'_>,
+    materials: usize,
+    warnings: &mut Vec<Fault>,
+) -> Result<Vec<Mapping>, Fault> {
+    let Some(extension) = primitive.extension("KHR_materials_variants")? else {
+        return Ok(Vec::new());
     };
-    extension.objects("mappings")?.iter().map(mapping).collect()
+    let (mut seen, mut list) = (BTreeSet::new(), Vec::new());
+    for item in extension.objects("mappings")? {
+        let material = item.required_index("material", materials, "material")?;
+        // Checked with the other references.
+        let mut variants = item.indices("variants", usize::MAX, "variant")?;
+        let count = variants.len();
+        variants.retain(|variant| seen.insert(*variant));
+        if variants.len() < count {
+            warnings.push(item.fault("it names a variant that has a material already; the first one counts"));
+        }
+        match variants.is_empty() {
+            true => warnings.push(item.fault("it chooses for no variant and is left out")),
+            false => {
+                list.push(Mapping { material, variants, name: item.name()?, unknown: unknown(&item, &[]) })
+            }
+        }
+    }
+    Ok(list)
 }
 
 /// Weights of `count` morph targets, of a mesh or a node; `None` when it has none.

@@ -2,6 +2,8 @@
 //! In: JSON, checked accessors and the tree. Out: skins, and parts that name them. A skin that cannot bend is left
 //! out with a warning: its meshes are then shown in their own pose.
 
+use std::collections::BTreeSet;
+
 use glam::{DAffine3, DMat4};
 
 use super::accessor::{Accessors, Component};
@@ -80,6 +82,10 @@ fn read(item: &Item<'_>, accessors: &Accessors<'_>, tree: &mut Tree) -> Result<O
                 return Ok(None);
             }
         }
+    }
+    let mut seen = BTreeSet::new();
+    if !joints.iter().all(|joint| seen.insert(*joint)) {
+        tree.warnings.push(item.fault("it names a joint twice; exports give it another node"));
     }
     Ok(inverse_bind.map(|inverse_bind| Skin { joints, inverse_bind }))
 }

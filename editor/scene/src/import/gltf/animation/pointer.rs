@@ -67,6 +67,9 @@ impl Reader<'_> {
             None => return Ok(None),
         };
         let Some((of, rest)) = self.place_of(pointer) else { return Ok(None) };
+        if self.read_times(sampler)?.is_err() {
+            return Ok(None);
+        }
         Ok(Some(KeptChannel {
             of,
             pointer: rest.to_owned(),

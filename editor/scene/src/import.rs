@@ -14,6 +14,7 @@ pub(crate) mod geometry;
 pub(crate) mod gltf;
 mod image;
 mod image_guard;
+mod memory;
 mod meshopt;
 mod obj;
 mod room;
@@ -35,13 +36,20 @@ pub struct ImportOptions {
     pub max_image_extent_px: u32,
     /// Most vertices and triangles that one file may bring.
     pub max_elements: usize,
+    /// Most bytes that the decoded images of one file may take.
+    pub max_image_bytes: u64,
     /// Reads what a project names outside of its own folder, which is left out otherwise.
     pub outside_project: bool,
 }
 
 impl Default for ImportOptions {
     fn default() -> Self {
-        Self { max_image_extent_px: 16_384, max_elements: 400_000_000, outside_project: false }
+        Self {
+            max_image_extent_px: 16_384,
+            max_elements: 400_000_000,
+            max_image_bytes: memory::half_of_machine(),
+            outside_project: false,
+        }
     }
 }
 

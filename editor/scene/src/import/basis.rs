@@ -70,6 +70,11 @@ pub(super) fn decode(bytes: &[u8], max_extent_px: u32) -> Result<Pixels, String>
     Ok(Pixels { width, height, rgba8: rgba8.into(), placeholder: false, of_print: false, encoded: None })
 }
 
+/// Width and height of the largest level.
+pub(super) fn dimensions(bytes: &[u8]) -> Result<(u32, u32), String> {
+    Container::read(bytes).map(|container| (container.width, container.height))
+}
+
 /// Zstandard, into exactly the bytes that the blocks of the image have.
 fn inflate(level: &[u8], canvas: &Canvas) -> Result<Vec<u8>, String> {
     let (columns, rows) = canvas.blocks();

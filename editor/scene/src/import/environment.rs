@@ -7,7 +7,7 @@ use std::path::Path;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, Rgb32FImage};
 
 use super::watched::Watched;
-use super::{ImportError, Warning, counted, image_guard};
+use super::{ImportError, Warning, counted, image_guard, memory};
 use crate::assets::RadianceMap;
 
 /// Widest and highest map that is read.
@@ -99,6 +99,12 @@ fn decode(bytes: &[u8], at: &Cell<u64>) -> Result<Rgb32FImage, String> {
     image_guard::guarded(|| {
         let decoder = reader.into_decoder().map_err(words)?;
         image_guard::check_size(&decoder, format, bytes.len())?;
+        // As the decoder gives it, and as three channels.
+        let (width, height) = decoder.dimensions();
+        let wanted = decoder.total_bytes().saturating_add(u64::from(width) * u64::from(height) * 12);
+        if let Some(reason) = memory::refusal(wanted, memory::half_of_machine()) {
+            return Err(reason);
+        }
         if decoder.dimensions().0 == 0 || decoder.dimensions().1 == 0 {
             return Err("the image has no texels".to_owned());
         }

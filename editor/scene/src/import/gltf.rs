@@ -81,8 +81,8 @@ fn read(
     progress("decoding images", 0.5);
     foreign.lost.extend(textures.unused());
     foreign.textures = textures.kept(&root)?;
-    let (textures, image_warnings) =
-        textures.load(&root, accessors.buffers(), &views, folder, options.max_image_extent_px)?;
+    let images = texture::Images::read(&root, accessors.buffers(), &views, folder, options)?;
+    let (textures, image_warnings) = textures.load(&root, images)?;
     let mut prefab = Prefab::new(file_stem(path), path);
     let shown = tree.scenes.get(tree.default_scene);
     prefab.environment = shown.and_then(|scene| scene.environment.clone());

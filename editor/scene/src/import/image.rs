@@ -62,6 +62,18 @@ pub(super) fn decode(bytes: Vec<u8>, max_extent_px: u32) -> Result<Pixels, Strin
     Ok(Pixels { width, height, rgba8: image.into_raw().into(), placeholder: false, of_print, encoded })
 }
 
+/// What the texels of an image take once they are decoded, bytes, as its head says; 0 where that cannot be read.
+pub(super) fn texel_bytes(bytes: &[u8]) -> u64 {
+    let size = match bytes.starts_with(basis::MAGIC) {
+        true => basis::dimensions(bytes),
+        false => image_guard::guarded(|| {
+            let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+            reader.map_err(|error| error.to_string())?.into_dimensions().map_err(|error| error.to_string())
+        }),
+    };
+    size.map_or(0, |(width, height)| u64::from(width) * u64::from(height) * 4)
+}
+
 /// How many channels a JPEG has (ITU-T T.81, annex B).
 fn jpeg_channels(bytes: &[u8]) -> Option<u8> {
     let mut at = 2;

@@ -132,7 +132,8 @@ fn warnings_of_one_kind_are_summed_up_after_the_first() {
 #[test]
 fn extras_of_any_depth_are_read_and_exported_as_they_were() {
     let folder = tempfile::tempdir().unwrap();
-    let path = write(folder.path(), 1, json!({"extras": {"a": "HERE"}, "extensions": {"X_none": ["HERE"]}}));
+    let path =
+        write(folder.path(), 1, json!({"extras": {"a": "HERE"}, "extensions": {"X_none": {"a": ["HERE"]}}}));
     let deep = format!("{}{{\"b\":\"]\\\"\"}}{}", "[".repeat(5000), "]".repeat(5000));
     let text = std::fs::read_to_string(&path).unwrap().replace("\"HERE\"", &deep);
     std::fs::write(&path, text).unwrap();
@@ -148,4 +149,29 @@ fn extras_of_any_depth_are_read_and_exported_as_they_were() {
         assert_eq!(text.matches(&deep).count(), 2, "{name}");
         load(&out, &ImportOptions::default()).unwrap();
     }
+}
+
+#[test]
+fn images_of_the_same_bytes_are_decoded_once_and_counted_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = ImportOptions::default();
+    image::RgbaImage::from_pixel(64, 32, image::Rgba([1, 2, 3, 4]))
+        .save(folder.path().join("a.png"))
+        .unwrap();
+    let images: Vec<Value> = ["a.png", "./a.png", "a.png"].iter().map(|uri| json!({"uri": uri})).collect();
+    let textures: Vec<Value> = (0..3).map(|i| json!({"source": i})).collect();
+    let color = |i: usize| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}, "normalTexture": {"index": i}});
+    let materials: Vec<Value> = (0..3).map(color).collect();
+    let path =
+        write(folder.path(), 1, json!({"images": images, "textures": textures, "materials": materials}));
+    let imported = load(&path, &options).unwrap();
+    assert_eq!(imported.textures.len(), 6, "three as colour, three as data");
+    let first = &imported.textures[0].rgba8;
+    assert!(imported.textures.iter().all(|texture| Arc::ptr_eq(&texture.rgba8, first)));
+    assert_eq!(imported.textures.iter().filter(|texture| texture.srgb).count(), 3);
+    let bytes = 64 * 32 * 4;
+    assert!(load(&path, &ImportOptions { max_image_bytes: bytes, ..options.clone() }).is_ok());
+    let refused =
+        load(&path, &ImportOptions { max_image_bytes: bytes - 1, ..options }).unwrap_err().to_string();
+    assert!(refused.contains("/images/0: with the images before it, decoded, it becomes"), "{refused}");
 }

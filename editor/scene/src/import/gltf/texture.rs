@@ -3,18 +3,17 @@
 //! a warning.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::path::Path;
 
-use rayon::prelude::*;
-
-use super::super::image::{Pixels, decode, placeholder};
-use super::accessor::View;
-use super::buffers::{Buffers, read_image_uri};
+use super::super::image::placeholder;
 use super::foreign::unknown;
 use super::json::{Fault, Item};
 use crate::assets::{Sampler, Texture, Wrap};
 use crate::foreign::KeptTexture;
 use crate::ids::TextureId;
+
+mod images;
+
+pub(super) use images::Images;
 
 /// Extensions that give a texture an image in a format that glTF itself does not know.
 const IMAGE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
@@ -132,29 +131,15 @@ impl TextureTable {
     }
 
     /// Decodes every image that is used, each once, on all cores.
-    pub fn load(
-        self,
-        root: &Item<'_>,
-        buffers: &Buffers,
-        views: &[View],
-        folder: &Path,
-        max_extent_px: u32,
-    ) -> Result<(Vec<Texture>, Vec<Fault>), Fault> {
-        let (images, items) = (root.objects("images")?, root.objects("textures")?);
-        let decode_all = |wanted: Vec<usize>| -> BTreeMap<usize, Result<Pixels, String>> {
-            let decode = |index: usize| {
-                let bytes = encoded(images.get(index)?, buffers, views, folder);
-                Some((index, bytes.and_then(|bytes| decode(bytes, max_extent_px))))
-            };
-            let wanted: BTreeSet<usize> = wanted.into_iter().collect();
-            wanted.into_par_iter().filter_map(decode).collect()
-        };
+    pub fn load(self, root: &Item<'_>, mut images: Images<'_>) -> Result<(Vec<Texture>, Vec<Fault>), Fault> {
+        let items = root.objects("textures")?;
         let keys = || self.wanted.iter().map(|(key, _)| key);
-        let mut decoded = decode_all(keys().filter_map(|key| key.image).collect());
+        let mut decoded = images.decode(keys().filter_map(|key| key.image).collect())?;
         let failed = |index: &usize| decoded.get(index).is_none_or(Result::is_err);
         let fallbacks =
             keys().filter(|key| key.image.as_ref().is_some_and(failed)).filter_map(|key| key.fallback);
-        decoded.extend(decode_all(fallbacks.collect()));
+        let fallbacks = fallbacks.collect();
+        decoded.extend(images.decode(fallbacks)?);
         let read = |index: usize| decoded.get(&index)?.as_ref().ok().map(|pixels| (index, pixels));
 
         let mut warnings = Vec::new();
@@ -185,7 +170,7 @@ impl TextureTable {
             }
             let shown = key.image.and_then(read).or_else(|| key.fallback.and_then(read));
             let pixels = shown.map_or(&stand_in, |(_, pixels)| pixels);
-            let item = shown.map(|(index, _)| index).or(key.image).and_then(|index| images.get(index));
+            let item = shown.map(|(index, _)| index).or(key.image).and_then(|index| images.items.get(index));
             textures.push(Texture {
                 name: item
                     .map(image_name)
@@ -211,19 +196,6 @@ fn image_name(image: &Item<'_>) -> Result<String, Fault> {
         (true, Some(uri)) => uri.to_owned(),
         _ => name,
     })
-}
-
-/// The bytes of an image file, wherever they are.
-fn encoded(image: &Item<'_>, buffers: &Buffers, views: &[View], folder: &Path) -> Result<Vec<u8>, String> {
-    let in_words = |fault: Fault| fault.reason;
-    if let Some(index) = image.index("bufferView", views.len(), "buffer view").map_err(in_words)? {
-        let bytes = views.get(index).and_then(|view| view.bytes(buffers));
-        return bytes.map(<[u8]>::to_vec).ok_or_else(|| format!("there is no buffer view {index}"));
-    }
-    match image.text("uri").map_err(in_words)? {
-        Some(uri) => read_image_uri(uri, folder),
-        None => Err("it has neither a URI nor a buffer view".to_owned()),
-    }
 }
 
 fn read_sampler(item: &Item<'_>) -> Result<Sampler, Fault> {

@@ -13,8 +13,8 @@ use super::mtl::Rest;
 use crate::assets::{Sampler, Texture, TextureUse, Wrap};
 use crate::ids::TextureId;
 use crate::import::gltf::buffers::read_file;
-use crate::import::image::{Pixels, decode, placeholder};
-use crate::import::{ImportOptions, short, uri};
+use crate::import::image::{Pixels, decode, placeholder, texel_bytes};
+use crate::import::{ImportOptions, memory, short, uri};
 
 /// Largest image file that is read, bytes.
 const MAX_IMAGE_FILE_BYTES: u64 = 1 << 30;
@@ -58,6 +58,8 @@ pub(super) struct Maps<'a> {
     options: &'a ImportOptions,
     warnings: &'a Warnings,
     images: HashMap<PathBuf, Pixels>,
+    /// What they take, bytes.
+    taken: u64,
     known: HashMap<Key, (TextureId, bake::Alpha)>,
     pub textures: Vec<Texture>,
 }
@@ -70,8 +72,8 @@ pub(super) struct Image {
 
 impl<'a> Maps<'a> {
     pub fn new(folder: &'a Path, options: &'a ImportOptions, warnings: &'a Warnings) -> Self {
-        let (images, known) = Default::default();
-        Self { folder, options, warnings, images, known, textures: Vec::new() }
+        let (images, known, taken) = Default::default();
+        Self { folder, options, warnings, images, taken, known, textures: Vec::new() }
     }
 
     /// The image that a line names; `None` when it names none.
@@ -91,6 +93,9 @@ impl<'a> Maps<'a> {
         let pixels = known.unwrap_or_else(|| {
             let read = path.and_then(|path| {
                 let bytes = read_file(&path, MAX_IMAGE_FILE_BYTES)?;
+                self.taken = self.taken.saturating_add(texel_bytes(&bytes));
+                let refusal = memory::refusal(self.taken, self.options.max_image_bytes);
+                refusal.map_or(Ok(()), |reason| Err(format!("with the images before it, {reason}")))?;
                 let pixels = decode(bytes, self.options.max_image_extent_px)?;
                 self.images.insert(path, pixels.clone());
                 Ok(pixels)

@@ -194,7 +194,7 @@ impl<'a> Steps<'a> {
             Some(material) => Edit::SetMaterial { material, value: Box::new(value) },
             None => {
                 let material = MaterialId(document.allocate_id());
-                Edit::AddMaterial { material, entry: Box::new(MaterialEntry { value, original: None }) }
+                Edit::AddMaterial { material, entry: Box::new(MaterialEntry::made_here(value)) }
             }
         }
     }

@@ -20,4 +20,5 @@ pub use mesh::{Mesh, MeshData, Primitive};
 pub use shapes::{
     Cloud, Distribution, MOST_SHAPES, Shape, ShapeFault, ShapeFile, ShapeKind, ShapeSource, Shapes,
 };
+pub(crate) use shapes::{MOST_SHAPES_IN_ALL, too_many_in_all};
 pub use texture::{Sampler, Texture, TextureUse, Wrap};

@@ -74,6 +74,25 @@ pub(crate) fn written(text: String) -> String {
     if out.is_empty() { text } else { out + rest }
 }
 
+/// What a value takes in memory beside itself, bytes: lists and objects are made with room for more.
+pub(crate) fn heap_bytes(value: &Value) -> usize {
+    // What an allocator gives at least.
+    const LEAST_BLOCK: usize = 32;
+    match value {
+        Value::Null | Value::Bool(_) | Value::Number(_) => 0,
+        Value::String(text) => text.capacity(),
+        Value::Array(list) => {
+            list.capacity() * size_of::<Value>() + list.iter().map(heap_bytes).sum::<usize>()
+        }
+        Value::Object(members) if members.is_empty() => 0,
+        Value::Object(members) => {
+            let places = (members.len() + 1).next_power_of_two().max(4);
+            let each = members.iter().map(|(key, inner)| key.capacity().max(LEAST_BLOCK) + heap_bytes(inner));
+            places * 7 / 8 * (size_of::<(String, Value)>() + 2 * size_of::<usize>()) + each.sum::<usize>()
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -45,6 +45,8 @@ pub struct Document {
     slots: BTreeMap<NodeId, Slot>,
     /// Parts of all instances.
     part_count: usize,
+    /// Spheres and boxes of all meshes.
+    shape_count: usize,
     roots: Vec<NodeId>,
     prefabs: BTreeMap<PrefabId, Prefab>,
     meshes: BTreeMap<MeshId, Mesh>,
@@ -135,6 +137,7 @@ impl Document {
         Self {
             slots: BTreeMap::new(),
             part_count: 0,
+            shape_count: 0,
             roots: Vec::new(),
             prefabs: BTreeMap::new(),
             meshes: BTreeMap::new(),
@@ -220,7 +223,7 @@ impl Document {
 
     /// A material.
     pub fn material(&self, id: MaterialId) -> Option<&Material> {
-        self.materials.get(&id).map(|entry| &entry.value)
+        self.materials.get(&id).map(|entry| &*entry.value)
     }
 
     /// A material with what its source says.
@@ -230,7 +233,7 @@ impl Document {
 
     /// All materials in order of id.
     pub fn materials(&self) -> impl Iterator<Item = (MaterialId, &Material)> {
-        self.materials.iter().map(|(id, entry)| (*id, &entry.value))
+        self.materials.iter().map(|(id, entry)| (*id, &*entry.value))
     }
 
     /// A texture.

@@ -5,7 +5,7 @@ use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
 use crate::animation::ClipChoice;
-use crate::assets::{Camera, Environment, Light, Material, Mesh, ShapeFault, ShapeSource};
+use crate::assets::{Camera, Environment, Light, Material, Mesh, ShapeFault, ShapeSource, too_many_in_all};
 use crate::document::Document;
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target};
 use crate::node::{MAX_NODES, Subtree};
@@ -306,6 +306,12 @@ pub enum EditError {
     /// The document would have more nodes than it may.
     #[error("the scene would have {count} nodes, those inside of instances counted; it can have {MAX_NODES}")]
     TooManyNodes {
+        /// How many there would be.
+        count: usize,
+    },
+    /// The document would have more spheres and boxes than it may.
+    #[error("{}", too_many_in_all(*count))]
+    TooManyShapes {
         /// How many there would be.
         count: usize,
     },

@@ -26,6 +26,7 @@ mod watched;
 pub use environment::load_environment;
 pub use error::{ImportError, Warning, counted};
 pub(crate) use error::{UTF16, is_utf16, plain, refuse_lfs_pointer, short, summed};
+pub(crate) use room::Room;
 pub use shapes::load_shapes;
 pub(crate) use uri::{Location, is_address, leads_out, resolve};
 

@@ -21,16 +21,47 @@ mod names;
 pub(crate) use names::AssetNames;
 use names::Names;
 
-/// A material with what its source says.
+/// A material with what its source says; the same one while it is not edited.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "EntryRecord", into = "EntryRecord")]
 pub struct MaterialEntry {
     /// What it is now.
-    pub value: Material,
+    pub value: Arc<Material>,
     /// What the imported file says; `None` for a material made here.
-    pub original: Option<Material>,
+    pub original: Option<Arc<Material>>,
+}
+
+/// How a journal says a [`MaterialEntry`].
+#[derive(Serialize, Deserialize)]
+struct EntryRecord {
+    value: Material,
+    original: Option<Material>,
+}
+
+impl From<EntryRecord> for MaterialEntry {
+    fn from(record: EntryRecord) -> Self {
+        Self { value: Arc::new(record.value), original: record.original.map(Arc::new) }
+    }
+}
+
+impl From<MaterialEntry> for EntryRecord {
+    fn from(MaterialEntry { value, original }: MaterialEntry) -> Self {
+        Self { value: Arc::unwrap_or_clone(value), original: original.map(Arc::unwrap_or_clone) }
+    }
 }
 
 impl MaterialEntry {
+    /// One that was made here.
+    pub fn made_here(value: Material) -> Self {
+        Self { value: Arc::new(value), original: None }
+    }
+
+    /// One as its source says it.
+    pub(crate) fn imported(value: Material) -> Self {
+        let value = Arc::new(value);
+        Self { original: Some(Arc::clone(&value)), value }
+    }
+
     /// Whether it differs from its source, or has none.
     pub fn is_edited(&self) -> bool {
         self.original.as_ref() != Some(&self.value)
@@ -68,7 +99,7 @@ pub(crate) fn package_with_ids(
     old: Option<&Prefab>,
 ) -> PrefabPackage {
     let Imported { prefab, meshes, materials, textures, .. } = put_ids(document, imported, old);
-    let materials = materials.into_iter().map(|value| MaterialEntry { original: Some(value.clone()), value });
+    let materials = materials.into_iter().map(MaterialEntry::imported);
     PrefabPackage {
         id,
         meshes: prefab.meshes.iter().copied().zip(meshes).collect(),

@@ -17,6 +17,7 @@ use crate::import::{ImportOptions, Warning, plain};
 pub(crate) mod atomic;
 mod fault;
 mod journal;
+mod lists;
 mod migrate;
 mod paths;
 mod read;

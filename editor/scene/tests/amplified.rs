@@ -5,7 +5,8 @@
 
 use std::path::Path;
 
-use caustica_scene::import::{ImportOptions, load};
+use caustica_scene::import::{ImportError, ImportOptions, load};
+use caustica_scene::{Document, Local, audit};
 use peak_alloc::PeakAlloc;
 use serde_json::{Value, json};
 
@@ -15,6 +16,9 @@ static MEMORY: PeakAlloc = PeakAlloc;
 /// What a small file may take, bytes, and a larger one by its size.
 const FREE_BYTES: usize = 256 << 20;
 const TIMES_FILE: usize = 10;
+
+/// Held by what measures.
+static ALONE: std::sync::Mutex<()> = std::sync::Mutex::new(());
 
 /// What becomes of a file.
 enum Wanted {
@@ -176,6 +180,7 @@ fn cases(bytes: usize) -> Vec<(&'static str, Value, Wanted)> {
 
 #[test]
 fn what_is_named_many_times_takes_no_more_memory_than_a_file_may() {
+    let _alone = ALONE.lock();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.gltf");
     let mut data = Data::new();
@@ -198,5 +203,70 @@ fn what_is_named_many_times_takes_no_more_memory_than_a_file_may() {
             _ => false,
         };
         assert!(fits, "{what}: {said:?}");
+    }
+}
+
+/// Lists whose elements say as little as is read, with the pointer that a refusal names.
+fn bare_lists(count: usize) -> Vec<(&'static str, Value)> {
+    let all = |value| times(count, value);
+    let lights = json!({"KHR_lights_punctual": {"lights": all(json!({"type": "point"}))}});
+    let variants = json!({"KHR_materials_variants": {"variants": all(json!({"name": "a"}))}});
+    let camera = json!({"type": "perspective", "perspective": {"yfov": 1, "znear": 1}});
+    let accessor = json!({"componentType": 5126, "type": "SCALAR", "count": 1});
+    let primitive = json!({"primitives": [{"attributes": {}}]});
+    vec![
+        ("/materials", json!({"materials": all(json!({}))})),
+        ("/nodes", json!({"nodes": all(json!({}))})),
+        ("/scenes", json!({"nodes": [{}], "scenes": all(json!({}))})),
+        ("/skins", json!({"nodes": [{}], "skins": all(json!({"joints": [0]}))})),
+        ("/meshes", json!({"meshes": all(primitive)})),
+        ("/accessors", json!({"accessors": all(accessor)})),
+        (
+            "/bufferViews",
+            json!({"buffers": [{"uri": "data:,aaaa", "byteLength": 4}],
+            "bufferViews": all(json!({"buffer": 0, "byteLength": 4}))}),
+        ),
+        ("/textures", json!({"textures": all(json!({}))})),
+        ("/samplers", json!({"samplers": all(json!({}))})),
+        ("/images", json!({"images": all(json!({"uri": "a"}))})),
+        ("/cameras", json!({"cameras": all(camera)})),
+        ("/animations", json!({"animations": all(json!({"channels": [], "samplers": []}))})),
+        ("/extensions/KHR_lights_punctual/lights", json!({"extensions": lights})),
+        ("/extensions/KHR_materials_variants/variants", json!({"extensions": variants})),
+    ]
+}
+
+/// Reads a file into a document, places it and audits that, as `caustica check` does.
+fn check(path: &Path) -> Result<(), ImportError> {
+    let mut document = Document::new();
+    let prefab = document.add_imported(load(path, &ImportOptions::default())?).unwrap();
+    let (_, edit) = document.instantiate_edit(prefab, None, Local::default());
+    document.apply(edit).unwrap();
+    document.update_transforms();
+    audit(&document);
+    Ok(())
+}
+
+#[test]
+fn many_things_that_say_nothing_are_counted() {
+    let _alone = ALONE.lock();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    for count in [40_000, 400_000] {
+        for (place, mut file) in bare_lists(count) {
+            file["asset"] = json!({"version": "2.0"});
+            let text = file.to_string();
+            std::fs::write(&path, &text).unwrap();
+            drop(file);
+            MEMORY.reset_peak_usage();
+            let before = MEMORY.current_usage();
+            let said = check(&path).err().map(|error| error.to_string());
+            let bytes = MEMORY.peak_usage().saturating_sub(before);
+            println!("{place}: {count} become {} MiB, {} bytes each: {said:?}", bytes >> 20, bytes / count);
+            let fits = said.as_ref().is_none_or(|said| said.contains(&format!("a.gltf: {place}: with")));
+            assert!(fits, "{place}: {said:?}");
+            let most = FREE_BYTES.max(32 * text.len());
+            assert!(said.is_some() || bytes <= most, "{place}: {} bytes take {bytes}", text.len());
+        }
     }
 }

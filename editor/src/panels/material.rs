@@ -291,7 +291,7 @@ fn own_copy(
     };
     let made = cx.session.edit_with(|document| {
         let material = MaterialId(document.allocate_id());
-        let entry = Box::new(MaterialEntry { value, original: None });
+        let entry = Box::new(MaterialEntry::made_here(value));
         let edits =
             vec![Edit::AddMaterial { material, entry }, Edit::AssignMaterial { target, primitive, material }];
         ((), Edit::batch("copied a material", edits))

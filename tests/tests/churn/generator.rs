@@ -268,7 +268,7 @@ impl Churn {
             "add material" => {
                 let material = MaterialId(document.allocate_id());
                 let value = self.material_value(document, Material::default());
-                Edit::AddMaterial { material, entry: Box::new(MaterialEntry { value, original: None }) }
+                Edit::AddMaterial { material, entry: Box::new(MaterialEntry::made_here(value)) }
             }
             _ => {
                 let own: Vec<MaterialId> = document.materials().map(|(id, _)| id).collect();

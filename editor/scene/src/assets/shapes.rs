@@ -12,6 +12,16 @@ use super::deform::{Bounds, join};
 /// Most shapes that one description may make: they take about 130 bytes each on the host and on the device.
 pub const MOST_SHAPES: u32 = 1 << 24;
 
+/// Most shapes that a document may have.
+pub(crate) const MOST_SHAPES_IN_ALL: usize = 1 << 25;
+
+/// Why it may not have so many, in words.
+pub(crate) fn too_many_in_all(count: usize) -> String {
+    format!(
+        "with those of the others it would have {count} spheres and boxes; a scene can have {MOST_SHAPES_IN_ALL}"
+    )
+}
+
 /// What a [`Shape`] is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShapeKind {

@@ -1,6 +1,8 @@
 //! Carries out edits of values and hands back what undoes them.
 //! Edits of the tree are in `apply_tree.rs`, those of prefabs in `apply_prefab.rs`, of shapes in `apply_shapes.rs`.
 
+use std::sync::Arc;
+
 use super::Document;
 use crate::assets::{Camera, Environment, Light, Material, TextureUse};
 use crate::changes::Content;
@@ -328,9 +330,9 @@ impl Document {
         }
         let entry = self.materials.entry(id).or_default();
         self.surroundings.note_material(Some(&entry.value), Some(&value));
-        let old = std::mem::replace(&mut entry.value, value);
+        let old = std::mem::replace(&mut entry.value, Arc::new(value));
         self.changes.materials.insert(id);
-        Ok(Edit::SetMaterial { material: id, value: Box::new(old) })
+        Ok(Edit::SetMaterial { material: id, value: Box::new(Arc::unwrap_or_clone(old)) })
     }
 
     fn add_material(&mut self, id: MaterialId, entry: MaterialEntry) -> Result<Edit, EditError> {

@@ -151,7 +151,7 @@ impl Document {
         }
         for (id, entry) in package.materials.into_iter().chain(package.beside) {
             self.reserve_ids_up_to(id.0);
-            let before = self.materials.get(&id).map(|before| &before.value);
+            let before = self.materials.get(&id).map(|before| &*before.value);
             self.surroundings.note_material(before, Some(&entry.value));
             self.materials.insert(id, entry);
             self.changes.removed_materials.remove(&id);
@@ -178,7 +178,7 @@ impl Document {
         self.changes.primitive_transforms.retain(|(id, _)| !gone.contains(id));
         for (id, _) in &package.materials {
             let old = self.materials.remove(id);
-            self.surroundings.note_material(old.as_ref().map(|entry| &entry.value), None);
+            self.surroundings.note_material(old.as_ref().map(|entry| &*entry.value), None);
             self.changes.materials.remove(id);
             self.changes.removed_materials.insert(*id);
         }

@@ -1,7 +1,7 @@
 //! Carries out edits of meshes of spheres and boxes, which are made here and belong to no prefab.
 
 use super::Document;
-use crate::assets::{Material, Mesh, ShapeFault, ShapeSource, Shapes};
+use crate::assets::{MOST_SHAPES_IN_ALL, Material, Mesh, ShapeFault, ShapeSource, Shapes};
 use crate::edit::{Edit, EditError, shown};
 use crate::ids::{MaterialId, MeshId, NodeId};
 use crate::node::{Node, NodeKind};
@@ -28,10 +28,7 @@ impl Document {
         for value in values {
             let material = MaterialId(self.allocate_id());
             ids.push(material);
-            edits.push(Edit::AddMaterial {
-                material,
-                entry: Box::new(MaterialEntry { value, original: None }),
-            });
+            edits.push(Edit::AddMaterial { material, entry: Box::new(MaterialEntry::made_here(value)) });
         }
         let value = Box::new(Mesh::of_shapes(name.to_owned(), source, &ids)?);
         let mesh = MeshId(self.allocate_id());
@@ -49,7 +46,9 @@ impl Document {
         for primitive in &value.primitives {
             self.require_material(primitive.material)?;
         }
+        self.require_shapes(value.shape_count(), 0)?;
         self.reserve_ids_up_to(id.0);
+        self.shape_count += value.shape_count();
         self.meshes.insert(id, value);
         self.changes.removed_meshes.remove(&id);
         self.changes.meshes.insert(id);
@@ -63,9 +62,19 @@ impl Document {
         }
         let value = Box::new(mesh.clone());
         self.meshes.remove(&id);
+        self.shape_count -= value.shape_count();
         self.changes.meshes.remove(&id);
         self.changes.removed_meshes.insert(id);
         Ok(Edit::AddMesh { mesh: id, value })
+    }
+
+    /// Whether so many spheres and boxes may be added once `fewer` are gone.
+    fn require_shapes(&self, more: usize, fewer: usize) -> Result<(), EditError> {
+        let count = (self.shape_count + more).saturating_sub(fewer);
+        match count > MOST_SHAPES_IN_ALL && !self.restoring {
+            true => Err(EditError::TooManyShapes { count }),
+            false => Ok(()),
+        }
     }
 
     fn user_of_mesh(&self, id: MeshId) -> Option<String> {
@@ -78,8 +87,12 @@ impl Document {
 
     pub(super) fn set_shapes(&mut self, id: MeshId, source: ShapeSource) -> Result<Edit, EditError> {
         let shapes = Shapes::new(source)?;
-        let mesh = self.meshes.get_mut(&id).ok_or_else(|| EditError::NoAsset(format!("mesh {}", id.0)))?;
+        let none = || EditError::NoAsset(format!("mesh {}", id.0));
+        let (more, fewer) = (shapes.list().len(), self.meshes.get(&id).ok_or_else(none)?.shape_count());
+        self.require_shapes(more, fewer)?;
+        let mesh = self.meshes.get_mut(&id).ok_or_else(none)?;
         let old = mesh.replace_shapes(shapes).ok_or(EditError::OtherShapes)?;
+        self.shape_count = self.shape_count + more - fewer;
         self.changes.meshes.insert(id);
         Ok(Edit::SetShapes { mesh: id, source: Box::new(old) })
     }

@@ -158,8 +158,9 @@ fn renumbered_mesh(mut mesh: crate::assets::Mesh, renumber: Renumber<'_>) -> cra
 }
 
 fn renumbered_material(mut entry: MaterialEntry, renumber: Renumber<'_>) -> MaterialEntry {
-    for value in entry.original.iter_mut().chain([&mut entry.value]) {
-        for slot in value.texture_slots_mut().flatten() {
+    let all = entry.original.iter_mut().chain([&mut entry.value]);
+    for value in all.filter(|value| value.textures().next().is_some()) {
+        for slot in Arc::make_mut(value).texture_slots_mut().flatten() {
             slot.texture = TextureId(renumber(slot.texture.0));
         }
     }

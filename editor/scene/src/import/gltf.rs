@@ -22,6 +22,7 @@ mod container;
 mod extras;
 mod foreign;
 mod json;
+mod lists;
 mod loose;
 mod material;
 mod mesh;
@@ -63,6 +64,7 @@ fn read(
     let counts = check::references(&root)?;
     progress("reading buffers", 0.1);
     let mut buffers = buffers::Buffers::read(&root, bytes, container.binary, folder)?;
+    lists::require_room(&root, buffers.room())?;
     let views = accessor::views(&root, &mut buffers, &counts)?;
     let accessors = accessor::Accessors::read(&root, &mut buffers, &views)?;
     progress("reading meshes", 0.2);

@@ -32,6 +32,11 @@ mod polygons;
 /// Largest material library that is read, bytes.
 const MAX_MTL_BYTES: u64 = 64 << 20;
 
+/// What a material becomes at the most, bytes, measured with a library of 200,000 that say nothing.
+const MATERIAL_BYTES: usize = 3000;
+/// What a byte of the model may become in materials.
+const MATERIAL_TIMES: usize = 16;
+
 /// Polygons stay whole: tobj makes fans of them all.
 const OPTIONS: LoadOptions =
     LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
@@ -83,6 +88,8 @@ pub(super) fn load(
     warn_of_fans(fans, path, &warnings);
     progress("building meshes", 0.4);
     let sources = libraries.read.into_inner().materials;
+    room.require(sources.len().saturating_mul(MATERIAL_BYTES), MATERIAL_TIMES)
+        .map_err(|no_room| ImportError::new(path, no_room.to_string()).at("newmtl"))?;
     warn_of_unknown(&used, &sources, path, &warnings);
     let mut imported = Imported::default();
     let mut maps = maps::Maps::new(folder, options, &warnings);

@@ -13,19 +13,22 @@ const FREE_BYTES: usize = 128 << 20;
 /// What a byte of a file may become. The most that a sound file needs is 14.5: positions without normals and indices of
 /// 16 bits, where every corner gets a vertex of its own with a normal and a tangent.
 const TIMES_FILE: usize = 16;
+/// What a file of any size may describe without data, bytes: most of the 256 MiB of a small one, as the program takes some itself.
+const FREE_DESCRIBED: usize = 240 << 20;
 /// What a byte of a compressed stream may become beyond that.
 const TIMES_COMPRESSED: usize = 240;
 
 /// The bytes that one file may still take.
 #[derive(Debug)]
-pub(super) struct Room {
+pub(crate) struct Room {
     limit: usize,
+    file: usize,
     left: AtomicUsize,
 }
 
 /// What does not fit, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct NoRoom {
+pub(crate) struct NoRoom {
     wanted: usize,
     left: usize,
     limit: usize,
@@ -48,7 +51,14 @@ impl Room {
             .saturating_mul(TIMES_FILE)
             .saturating_add(compressed.min(bytes).saturating_mul(TIMES_COMPRESSED))
             .max(FREE_BYTES);
-        Self { limit, left: AtomicUsize::new(limit) }
+        Self { limit, file: bytes, left: AtomicUsize::new(limit) }
+    }
+
+    /// Whether what the file describes without any data, its text and what its lists make, may become `wanted` bytes in all:
+    /// `times` its size, or most of what a small file may take.
+    pub fn require(&self, wanted: usize, times: usize) -> Result<(), NoRoom> {
+        let limit = self.file.saturating_mul(times).max(FREE_DESCRIBED);
+        if wanted <= limit { Ok(()) } else { Err(NoRoom { wanted, left: limit, limit }) }
     }
 
     /// Most bytes that the file may take.

@@ -15,7 +15,9 @@ use super::record::{
     ShapesRecord, missing_mesh, placeholder,
 };
 use super::unknown::ProjectFile;
-use super::{Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, fault, migrate, sound};
+use super::{
+    Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, fault, lists, migrate, sound,
+};
 use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, ShapeSource};
 use crate::document::Document;
 use crate::edit::{Edit, EditError};
@@ -67,11 +69,17 @@ pub(super) fn parse(bytes: &[u8]) -> Result<ProjectFile, ProjectProblem> {
     }
     if found < SCHEMA_VERSION {
         let value = migrate::to_newest(found, value);
-        return serde_json::from_value(value.clone()).map_err(|error| fault::of_field(&value, bytes, error));
+        let record =
+            serde_json::from_value(value.clone()).map_err(|error| fault::of_field(&value, bytes, error))?;
+        lists::require_room(bytes.len(), &value, &record)?;
+        return Ok(ProjectFile::new(record, &value)?);
     }
     // From the text again, so that errors name a line too.
     match serde_json::from_slice(bytes) {
-        Ok(record) => Ok(ProjectFile::new(record, &value)?),
+        Ok(record) => {
+            lists::require_room(bytes.len(), &value, &record)?;
+            Ok(ProjectFile::new(record, &value)?)
+        }
         Err(error) => Err(fault::of_field(&value, bytes, error)),
     }
 }
@@ -262,7 +270,7 @@ impl Loader<'_> {
                 let message = "was edited, but is not in its source any more; the edit is kept on save";
                 self.warn(place.to_owned(), message.to_owned());
             }
-            let entry = MaterialEntry { value, original: None };
+            let entry = MaterialEntry::made_here(value);
             Edit::AddMaterial { material: id, entry: Box::new(entry) }
         };
         self.apply(place, edit)
@@ -390,15 +398,6 @@ impl Loader<'_> {
             }
             other => other.into(),
         };
-        let shines_below_zero = match &environment {
-            Environment::Constant(radiance) => radiance.min_element() < 0.0,
-            Environment::File(file) => file.scale < 0.0,
-            Environment::Auto | Environment::DefaultSky => false,
-        };
-        if shines_below_zero {
-            let reason = "/environment: it takes light away: its radiance or scale is below 0";
-            return Err(ProjectProblem::Broken(reason.to_owned()));
-        }
         self.apply("/environment", Edit::SetEnvironment(environment))
     }
 

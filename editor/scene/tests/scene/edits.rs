@@ -22,7 +22,7 @@ fn every_edit(scene: &mut Scene) -> Vec<Edit> {
     };
     let wide = Camera { near_m: 0.5, ..Camera::default() };
     let material = Material { roughness: 0.25, ..document.material(materials[0]).unwrap().clone() };
-    let entry = MaterialEntry { value: Material::default(), original: None };
+    let entry = MaterialEntry::made_here(Material::default());
     let children = Subtree {
         nodes: (0..3)
             .map(|i| {

@@ -27,7 +27,7 @@ fn add_group(document: &mut Document, name: &str, parent: Option<NodeId>, local:
 
 pub fn add_material(document: &mut Document, value: Material) -> MaterialId {
     let material = MaterialId(document.allocate_id());
-    apply(document, Edit::AddMaterial { material, entry: Box::new(MaterialEntry { value, original: None }) });
+    apply(document, Edit::AddMaterial { material, entry: Box::new(MaterialEntry::made_here(value)) });
     material
 }
 

@@ -76,7 +76,7 @@ fn all_kinds(root: &Path, kept: &mut Kept, scene: &crate::common::Scene, whole: 
     let light = document.light_of(scene.part(LAMP)).unwrap();
     let camera = document.camera_of(part).unwrap();
     let own = MaterialId(document.allocate_id());
-    let entry = Box::new(MaterialEntry { value: Material::default(), original: None });
+    let entry = Box::new(MaterialEntry::made_here(Material::default()));
     let first = document.materials().next().map(|(id, value)| (id, value.clone())).unwrap();
     let source = ShapeSource::File(load_shapes(&shapes).unwrap());
     let (dust, add_dust) = document.add_shapes_edit("Dust", source, &[], trs(0.0, 0.0, 1.0)).unwrap();

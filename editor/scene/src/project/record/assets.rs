@@ -9,7 +9,7 @@ use glam::DAffine3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{MaterialRecord, MeshRecord};
-use crate::assets::{Mesh, MeshData, Primitive, ShapeSource};
+use crate::assets::{Mesh, MeshData, Primitive, ShapeSource, Texture};
 use crate::ids::{MaterialId, MeshId, PrefabId, TextureId};
 use crate::import::placeholder_texture;
 use crate::package::{AssetNames, MaterialEntry, PrefabPackage};
@@ -70,7 +70,10 @@ impl From<PrefabPackage> for PackageRecord {
     fn from(package: PrefabPackage) -> Self {
         let PrefabPackage { id, prefab, meshes, materials, beside, .. } = package;
         let edited = materials.into_iter().filter(|(_, entry)| entry.is_edited());
-        let record = |(id, entry): (MaterialId, MaterialEntry)| MaterialRecord { id, value: entry.value };
+        let record = |(id, entry): (MaterialId, MaterialEntry)| MaterialRecord {
+            id,
+            value: Arc::unwrap_or_clone(entry.value),
+        };
         Self {
             missing: prefab.missing,
             edited: edited.map(record).collect(),
@@ -88,13 +91,12 @@ impl From<PackageRecord> for PrefabPackage {
         for MaterialRecord { id, value } in record.edited {
             let place = package.materials.iter_mut().find(|(known, _)| *known == id);
             if let Some((_, entry)) = place {
-                entry.value = value;
+                entry.value = Arc::new(value);
             }
         }
         let beside = record.beside.into_iter();
-        package.beside = beside
-            .map(|MaterialRecord { id, value }| (id, MaterialEntry { value, original: None }))
-            .collect();
+        package.beside =
+            beside.map(|MaterialRecord { id, value }| (id, MaterialEntry::made_here(value))).collect();
         for MeshRecord { id, primitives } in record.moved {
             let place = package.meshes.iter_mut().find(|(known, _)| *known == id);
             if let (Some((_, mesh)), Some((&last, _))) = (place, primitives.last_key_value()) {
@@ -180,15 +182,14 @@ pub(crate) fn placeholder(record: &PrefabRecord, source: PathBuf) -> PrefabPacka
     prefab.textures.clone_from(&record.textures);
     prefab.asset_names = Arc::new(record.asset_names.clone());
     let named = |id: u64| format!("missing {id}");
-    let material = |id: u64| {
-        let value = Material { name: named(id), ..Material::default() };
-        MaterialEntry { original: Some(value.clone()), value }
-    };
+    let material = |id: u64| MaterialEntry::imported(Material { name: named(id), ..Material::default() });
+    let texture = placeholder_texture(String::new());
+    let texture = |id: u64| Texture { name: named(id), ..texture.clone() };
     PrefabPackage {
         id: record.id,
         meshes: record.meshes.iter().map(|&id| (id, missing_mesh(id))).collect(),
         materials: record.materials.iter().map(|&id| (id, material(id.0))).collect(),
-        textures: record.textures.iter().map(|&id| (id, placeholder_texture(named(id.0)))).collect(),
+        textures: record.textures.iter().map(|&id| (id, texture(id.0))).collect(),
         beside: Vec::new(),
         prefab,
     }

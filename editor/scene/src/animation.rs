@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 mod begin;
 mod property;
 
-pub(crate) use property::Animated;
 pub use property::Property;
+pub(crate) use property::{Animated, hold};
 
 use crate::ids::MaterialId;
 

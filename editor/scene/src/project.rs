@@ -16,6 +16,7 @@ use crate::import::{ImportOptions, Warning, plain};
 
 pub(crate) mod atomic;
 mod fault;
+mod held;
 mod journal;
 mod lists;
 mod migrate;

@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use caustica_renderer::ViewSettings;
-use caustica_scene::import::{self, ImportOptions, Imported};
+use caustica_scene::import::{self, ImportOptions, Imported, Warning};
 use caustica_scene::{
     Document, Edit, Environment, EnvironmentFile, Local, MAX_RADIANCE, Material, NodeId, Project,
     ProjectMeta, RadianceMap, ShapeFault, ShapeFile, ShapeSource,
 };
 use glam::Vec4;
+use serde_json::{Map, Value};
 
 use super::camera::ViewCamera;
 
@@ -40,7 +41,8 @@ pub fn load(path: &Path, outside: bool, progress: &dyn Fn(&str, f32)) -> anyhow:
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     if Project::is_project_path(path) {
         let options = ImportOptions { outside_project: outside, ..ImportOptions::default() };
-        let project = Project::load_with_progress(path, &options, progress)?;
+        let mut project = Project::load_with_progress(path, &options, progress)?;
+        project.warnings.extend(view_faults(path, &project.meta));
         project.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
         return Ok(Loaded::Project(Box::new(project)));
     }
@@ -94,12 +96,33 @@ fn absolute(path: &Path) -> PathBuf {
 /// Camera and settings that a project notes.
 pub(super) fn noted_view(meta: &ProjectMeta) -> (Option<ViewCamera>, Option<ViewSettings>) {
     let camera = meta.view.get(CAMERA_KEY).and_then(|v| serde_json::from_value(v.clone()).ok());
-    let settings = (!meta.render.is_empty())
-        .then(|| serde_json::from_value(serde_json::Value::Object(meta.render.clone())));
-    let settings = settings.and_then(|read| {
-        read.inspect_err(|error| tracing::warn!("the project's render settings: {error}")).ok()
+    let readable = meta.render.iter().filter(|(key, value)| setting_fault(key, value).is_none());
+    let readable: Map<String, Value> = readable.map(|(key, value)| (key.clone(), value.clone())).collect();
+    let settings = (!readable.is_empty()).then(|| serde_json::from_value(Value::Object(readable)).ok());
+    (camera, settings.flatten())
+}
+
+/// Why one of the settings cannot be read.
+fn setting_fault(key: &str, value: &Value) -> Option<serde_json::Error> {
+    let alone: Map<String, Value> = [(key.to_owned(), value.clone())].into_iter().collect();
+    serde_json::from_value::<ViewSettings>(Value::Object(alone)).err()
+}
+
+/// What of the noted camera and settings cannot be read; the rest counts.
+fn view_faults(path: &Path, meta: &ProjectMeta) -> Vec<Warning> {
+    let warning = |place: String, message: String| Warning { file: path.to_owned(), place, message };
+    let settings = meta.render.iter().filter_map(|(key, value)| {
+        let error = setting_fault(key, value)?;
+        Some(warning(format!("/render/{key}"), format!("{error}; the default is taken")))
     });
-    (camera, settings)
+    let camera = meta.view.iter().filter_map(|(key, value)| match key.as_str() {
+        CAMERA_KEY => {
+            let error = serde_json::from_value::<ViewCamera>(value.clone()).err()?;
+            Some(warning(format!("/view/{key}"), format!("{error}; a camera of the scene is taken")))
+        }
+        _ => Some(warning(format!("/view/{key}"), String::from("it is not known, and only kept on save"))),
+    });
+    settings.chain(camera).collect()
 }
 
 /// What an import brought.
@@ -197,7 +220,7 @@ pub(super) fn note_view(meta: &mut ProjectMeta, camera: &ViewCamera, settings: &
     if let Ok(value) = serde_json::to_value(camera) {
         meta.view.insert(String::from(CAMERA_KEY), value);
     }
-    if let Ok(serde_json::Value::Object(map)) = serde_json::to_value(settings) {
+    if let Ok(Value::Object(map)) = serde_json::to_value(settings) {
         for (key, value) in map {
             meta.render.insert(key, value);
         }

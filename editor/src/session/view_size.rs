@@ -9,8 +9,6 @@ use super::room::{mib, more_memory};
 
 /// Coarsest view that is tried: one pixel for so many in each direction.
 const COARSEST: u32 = 8;
-/// The same for a picture that is refused.
-const COARSEST_PICTURE: u32 = 16;
 
 /// How coarse the view has to be.
 #[derive(Debug)]
@@ -147,8 +145,8 @@ impl Session {
                 ))
             }
             None => error.context(format!(
-                "the scene has no room in {:.0} MiB of device memory, not even at 1/{COARSEST_PICTURE} of {width}x{height}; fewer \
-                 or simpler meshes would help, or {}",
+                "the scene has no room in {:.0} MiB of device memory, not even at one pixel of {width}x{height}; fewer or simpler \
+                 meshes would help, or {}",
                 mib(budget.budget_bytes),
                 more_memory(budget)
             )),
@@ -158,7 +156,8 @@ impl Session {
     /// The largest part of a size that can be rendered and read, by rendering it, and about how many bytes the whole takes.
     fn what_fits(&mut self, extent_px: [u32; 2]) -> Option<([u32; 2], u64)> {
         let mut divisor = 2;
-        while divisor <= COARSEST_PICTURE {
+        // Down to a pixel.
+        while divisor / 2 < extent_px[0].max(extent_px[1]) {
             if let Ok(accumulated) = self.try_at(extent_px, divisor) {
                 let times = u64::from(divisor).pow(2);
                 let targets = self.bytes_of(MemoryUse::Targets);

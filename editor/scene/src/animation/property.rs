@@ -73,6 +73,21 @@ impl Property {
     }
 }
 
+/// Holds every number to its range. A number that is not finite is left to who refuses it.
+pub(crate) fn hold<T: Animated>(value: &mut T) {
+    let fits =
+        |row: &Row<T>, number: &f32| !number.is_finite() || (row.range.0..=row.range.1).contains(number);
+    // To ask for a number may make what has it, with numbers that fit.
+    let mut asked = value.clone();
+    for row in T::PROPERTIES {
+        let numbers = (row.slot)(&mut asked).unwrap_or_default();
+        if !numbers.iter().all(|number| fits(row, number)) {
+            let numbers = (row.slot)(value).unwrap_or_default();
+            numbers.iter_mut().for_each(|number| *number = number.clamp(row.range.0, row.range.1));
+        }
+    }
+}
+
 const ANY: (f32, f32) = (f32::MIN, f32::MAX);
 const UNIT: (f32, f32) = (0.0, 1.0);
 const POSITIVE: (f32, f32) = (0.0, f32::MAX);

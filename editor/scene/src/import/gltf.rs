@@ -31,6 +31,7 @@ mod skin;
 mod surroundings;
 mod texture;
 
+pub(crate) use carried::{DEFAULT_NEAR_M, LEAST_CONE_RAD};
 pub(crate) use check::is_read;
 pub(crate) use material::{INFINITE_IOR, is_smooth_glass};
 pub(crate) use node::unit as unit_rotation;

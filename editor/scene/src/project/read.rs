@@ -16,7 +16,7 @@ use super::record::{
 };
 use super::unknown::ProjectFile;
 use super::{
-    Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, fault, lists, migrate, sound,
+    Fingerprint, Project, ProjectMeta, ProjectProblem, SCHEMA_VERSION, fault, held, lists, migrate, sound,
 };
 use crate::assets::{Environment, EnvironmentFile, Material, Mesh, ShapeFile, ShapeSource};
 use crate::document::Document;
@@ -134,8 +134,9 @@ impl<'a> Loader<'a> {
             loader.add_prefab(&element("prefabs", index, prefab.id.0, &prefab.name), prefab)?;
         }
         loader.shared.clear();
-        for (index, material) in record.materials.into_iter().enumerate() {
+        for (index, mut material) in record.materials.into_iter().enumerate() {
             let place = element("materials", index, material.id.0, &material.value.name);
+            loader.warn_all(held::material(&mut material.value, &format!("/materials/{index}/value")));
             loader.add_material(&place, material)?;
         }
         for (index, shapes) in record.shapes.into_iter().enumerate() {
@@ -145,7 +146,8 @@ impl<'a> Loader<'a> {
             loader.move_primitives(&element("meshes", index, mesh.id.0, ""), mesh);
         }
         loader.require_room(&record.nodes)?;
-        for (index, node) in record.nodes.into_iter().enumerate() {
+        for (index, mut node) in record.nodes.into_iter().enumerate() {
+            loader.warn_all(held::node(&mut node, &format!("/nodes/{index}")));
             loader.add_node(&element("nodes", index, node.id.0, &node.name), node)?;
         }
         loader.set_environment(record.environment)?;
@@ -180,6 +182,10 @@ fn shared_sources(
 impl Loader<'_> {
     pub fn warn(&mut self, place: String, message: String) {
         self.warnings.push(Warning { file: self.path.to_owned(), place, message });
+    }
+
+    fn warn_all(&mut self, said: Vec<(String, String)>) {
+        said.into_iter().for_each(|(place, message)| self.warn(place, message));
     }
 
     /// `place` is what of the file the edit stands for.
@@ -398,6 +404,9 @@ impl Loader<'_> {
             }
             other => other.into(),
         };
+        if let Some(reason) = sound::refusal_of_environment(&environment) {
+            return Err(ProjectProblem::Broken(reason));
+        }
         self.apply("/environment", Edit::SetEnvironment(environment))
     }
 

@@ -4,6 +4,7 @@
 use glam::DQuat;
 
 use super::record::{LocalRecord, NodeRecord};
+use crate::assets::Environment;
 
 /// Largest difference of the length of a rotation from 1 that is rounding.
 const LENGTH_TOLERANCE: f64 = 1e-6;
@@ -33,6 +34,28 @@ pub(super) fn refusal(record: &NodeRecord) -> Option<String> {
     Some(format!(
         "says of its place{of} a matrix beside translation, rotation or scale; one or the other counts"
     ))
+}
+
+/// Why surroundings cannot be: each number that is none, or takes light away, with its place.
+pub(super) fn refusal_of_environment(environment: &Environment) -> Option<String> {
+    let numbers: Vec<(String, f32)> = match environment {
+        Environment::Constant(radiance) => {
+            let channels = radiance.to_array().into_iter().enumerate();
+            channels.map(|(channel, value)| (format!("/environment/radiance/{channel}"), value)).collect()
+        }
+        Environment::File(file) => vec![
+            ("/environment/scale".to_owned(), file.scale),
+            ("/environment/rotationRad".to_owned(), file.rotation_rad.abs()),
+        ],
+        Environment::Auto | Environment::DefaultSky => Vec::new(),
+    };
+    let bad = numbers.into_iter().filter_map(|(place, value)| match value {
+        _ if !value.is_finite() => Some(format!("{place}: it is larger than single precision can hold")),
+        _ if value < 0.0 => Some(format!("{place}: {value} is below 0, which takes light away")),
+        _ => None,
+    });
+    let bad: Vec<String> = bad.collect();
+    (!bad.is_empty()).then(|| bad.join("; "))
 }
 
 /// Makes every rotation one of length 1; says which were none.

@@ -206,7 +206,11 @@ fn a_project_keeps_lobes_and_the_audit_looks_at_them() {
     let path = folder.path().join("scene.caustica");
     Project::save(&path, &document, &ProjectMeta::default()).unwrap();
     let again = Project::load(&path).unwrap();
-    assert_eq!(again.document.material(id), Some(&value));
+    let held = Iridescence { factor: 1.0, ..Iridescence::default() };
+    let held = Material { iridescence: Some(held), ..value.clone() };
+    assert_eq!(again.document.material(id), Some(&held));
+    let is_said = again.warnings.iter().any(|w| w.place == "/materials/0/value/iridescence/factor");
+    assert!(is_said, "{:?}", again.warnings);
 
     let broken = Material { sheen: Some(Sheen { roughness: f32::NAN, ..Sheen::default() }), ..value };
     assert!(document.apply(Edit::SetMaterial { material: id, value: Box::new(broken) }).is_err());

@@ -35,6 +35,7 @@ mod oracle;
 mod projects;
 mod projects_moved;
 mod projects_sources;
+mod projects_values;
 mod rig_damage;
 mod rig_import;
 mod scenes;

@@ -23,7 +23,7 @@ pub fn edited(folder: &std::path::Path) -> Scene {
         emissive: Vec3::new(0.1, 0.2, 0.3),
         ..scene.document.material(materials[1]).unwrap().clone()
     };
-    let entry = MaterialEntry { value: Material::default(), original: None };
+    let entry = MaterialEntry::made_here(Material::default());
     let (plate, lamp) = (scene.part(PLATE), scene.part(LAMP));
     let mut lamp_light = scene.document.light_of(lamp).unwrap();
     lamp_light.intensity = 3.5;
@@ -238,8 +238,9 @@ fn other_files_and_newer_versions_are_refused_in_words() {
         let both = load(&format!(r#"{{"caustica":2,"nodes":[{{"id":1,"name":"a",{node}}}]}}"#));
         assert!(both.to_string().contains(words) && both.to_string().contains("node 1"), "{both}");
     }
-    let dark = load(r#"{"caustica":2,"environment":{"kind":"constant","radiance":[0,-1,0]}}"#);
-    assert!(dark.to_string().contains("environment: it takes light away"), "{dark}");
+    let dark = load(r#"{"caustica":2,"environment":{"kind":"constant","radiance":[1e39,-1,0]}}"#);
+    let said = "/environment/radiance/0: it is larger than single precision can hold; /environment/radiance/1: -1 is below 0";
+    assert!(dark.to_string().contains(said), "{dark}");
 }
 
 #[test]

@@ -15,9 +15,9 @@ const DEFAULT_LIGHT_RADIUS_M: f64 = 0.0;
 /// Full angle of directional lights whose file gives none, degrees: hard shadows likewise.
 const DEFAULT_SUN_ANGLE_DEG: f64 = 0.0;
 /// Narrowest cone, radians: the format wants some angle.
-const LEAST_CONE_RAD: f32 = 1e-6;
+pub(crate) const LEAST_CONE_RAD: f32 = 1e-6;
 /// Nearest distance drawn by cameras whose file gives none that can be used, metres.
-const DEFAULT_NEAR_M: f32 = 0.01;
+pub(crate) const DEFAULT_NEAR_M: f32 = 0.01;
 
 /// A number in `extras` of the light, else of the node that carries it.
 fn extra(

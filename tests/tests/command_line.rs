@@ -416,6 +416,11 @@ fn faults_of_the_device_end_with_3() {
     let run = caustica(folder.path(), &[&common[..], &["--memory-budget", "16"]].concat());
     assert_eq!(run.code, Some(3), "{}", run.stderr);
     assert!(run.stderr.contains("out of device memory"), "{}", run.stderr);
+    // A size that fits is named however small it is.
+    std::fs::write(folder.path().join("cube.gltf"), cube(false)).expect("a file");
+    let large = ["render", "cube.gltf", "-o", "a.png", "--size", "8000x8000", "--memory-budget", "64"];
+    let run = caustica(folder.path(), &large);
+    assert!(run.stderr.contains("has room, as would --memory-budget"), "{}", run.stderr);
 }
 
 #[test]
@@ -442,6 +447,18 @@ fn check_of_several_files_goes_on_after_a_bad_one() {
     assert!(report["files"][1]["milliseconds"].is_number());
     let run = caustica(folder.path(), &["check", "good.obj", "good.obj"]);
     assert_eq!((run.code, run.stdout.lines().count()), (Some(0), 3), "{}", run.stdout);
+}
+
+#[test]
+fn settings_of_a_project_that_cannot_be_read_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = r#"{"caustica":2,"render":{"pipeline":"nonsense","max_depth":-5},"view":{"exposure":"x"}}"#;
+    std::fs::write(folder.path().join("p.caustica.json"), text).expect("a file");
+    let run = caustica(folder.path(), &["check", "p.caustica.json", "--json"]);
+    let said = json_of(&run)["import_warnings"].to_string();
+    for place in ["/render/pipeline", "/render/max_depth", "/view/exposure"] {
+        assert!(said.contains(&format!("p.caustica.json: {place}: ")), "{said}");
+    }
 }
 
 #[test]

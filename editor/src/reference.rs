@@ -14,7 +14,7 @@ use crate::exr_file::{self, Note};
 use crate::session::Session;
 
 /// Of a reference's random numbers: a picture that is compared with it has others, else both err alike.
-const SEED: u32 = 0x5eed;
+pub const SEED: u32 = 0x5eed;
 /// Channels of the mean, and of half of the difference of the two streams.
 const CHANNELS: [[&str; 3]; 2] =
     [["R", "G", "B"], ["halfDifference.R", "halfDifference.G", "halfDifference.B"]];

@@ -216,6 +216,12 @@ pub struct ViewSettings {
 }
 
 impl ViewSettings {
+    /// Whether more and more samples lead to the truth: not where light is left out, paths end early, or frames are denoised.
+    #[must_use]
+    pub fn is_unbiased(&self) -> bool {
+        self.pipeline == Pipeline::Path && self.path_depth.is_none() && !self.denoise_stills
+    }
+
     /// These for a still: denoised over its frames, each with all of those before it as its past, and over space too; or not.
     #[must_use]
     pub fn for_still(self, temporal: bool, spatial: bool) -> Self {

@@ -38,6 +38,9 @@ pub use pose::Driven;
 use pose::Pose;
 use surroundings::Surroundings;
 
+/// Documents are merged up to this number: what is made after that has room up to where files are refused.
+pub(crate) const MOST_MERGED_ID: u64 = 1 << 62;
+
 /// A scene that is being edited. Cloning is cheap in vertices and texels, which are shared.
 /// Equality compares what the user made, not the time that is shown, caches, pending changes or the id counter.
 #[derive(Clone, Debug)]

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use caustica_renderer::delta::LightId;
-use caustica_renderer::{Estimate, Noise, Pipeline, ViewSettings, WakeFn};
+use caustica_renderer::{Estimate, Noise, ViewSettings, WakeFn};
 use indicatif::ProgressBar;
 use serde_json::json;
 
@@ -140,10 +140,10 @@ fn picture(
             metadata.seconds,
             metadata.pipeline,
             noise.map_or_else(|| String::from("unknown"), in_words),
-            match (denoised, session.settings().pipeline) {
+            match (denoised, session.settings().is_unbiased()) {
                 (true, _) => ", denoised: bias unknown",
-                (false, Pipeline::Path) => "",
-                (false, _) => ", bias unknown",
+                (false, true) => "",
+                (false, false) => ", bias unknown",
             },
             metadata.device
         );
@@ -255,7 +255,8 @@ fn summary(
         "ms_per_pass": passes,
         "noise": noise.map(|noise| noise.error().value),
         "noise_interval": noise.map(|noise| [noise.error().low, noise.error().high]),
-        "efficiency": noise.map(|noise| noise.efficiency(metadata.seconds)),
+        "bias": if session.settings().is_unbiased() { "none" } else { "unknown" },
+        "efficiency": noise.map(|noise| noise.efficiency(session.total_device_ms() * 1e-3)),
         "denoised": denoised,
         "acceleration_structures": statistics.acceleration,
         "memory_bytes": memory,

@@ -122,6 +122,9 @@ pub(super) fn run(
     if let Some(twice) = twice(&args.pipelines) {
         bail!("--pipelines: '{twice}' stands there twice");
     }
+    if args.seed == reference::SEED {
+        bail!("--seed {}: the reference has these random numbers, and both would err alike", args.seed);
+    }
     let progress = progress_bar(args.json);
     progress.set_message("loading");
     let loaded = args.shot.load(&steps_on(&progress))?;

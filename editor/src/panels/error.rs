@@ -1,7 +1,7 @@
 //! The Error panel: how far the picture is from what it becomes and from a reference, and what a millisecond buys. Enters: what
 //! `ErrorWatch` has gathered. Leaves: a wish for a reference, an error to stop at.
 
-use caustica_renderer::{Estimate, Pipeline, Show};
+use caustica_renderer::{Estimate, Show};
 use egui::{Color32, DragValue, ProgressBar, RichText, Ui};
 use egui_phosphor::regular as icon;
 use egui_plot::{HoverPosition, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text};
@@ -89,6 +89,10 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui) {
     let tip = "What more samples take away, with the interval that holds it in 95 of 100 cases: sqrt(relMSE) of linear radiance";
     row(ui, "Noise", noise, tip);
     match found.against {
+        // Frames that share their past err alike, and this would be told as bias.
+        Some(against) if settings.denoise_stills => {
+            row(ui, "Error", percent(against.split.total), "Noise and bias together");
+        }
         Some(against) => {
             row(
                 ui,
@@ -109,8 +113,11 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui) {
             );
         }
         None => {
-            let unbiased = settings.pipeline == Pipeline::Path && !settings.denoise_stills;
-            let words = if unbiased { "none: path is the truth" } else { "unknown without a reference" };
+            let words = if settings.is_unbiased() {
+                "none: path is the truth"
+            } else {
+                "unknown without a reference"
+            };
             row(ui, "Bias", String::from(words), "What stays, however many samples are taken");
         }
     }

@@ -196,7 +196,7 @@ mod tests {
                 shared,
                 size,
                 uses,
-                "a.comp:4:1: shared memory: this device allows 1024 bytes a workgroup, found 7264",
+                "a.comp:3:1: shared memory: this device allows 1024 bytes a workgroup, found 7264",
             ),
             (
                 "",

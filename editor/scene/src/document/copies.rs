@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::Document;
+use super::{Document, MOST_MERGED_ID};
 use crate::edit::{Edit, EditError};
 use crate::ids::{MaterialId, MeshId, NodeId, PrefabId, Target, TextureId};
 use crate::node::{Node, NodeKind, Subtree};
@@ -81,7 +81,8 @@ impl Document {
     pub fn merge_edit(&mut self, other: &Document, name: &str) -> Result<Copies, EditError> {
         let empty = EditError::NoTree(format!("there is nothing in {name}"));
         let offset = self.next_id;
-        let last = offset.checked_add(other.next_id).ok_or(EditError::Taken("every id".to_owned()))?;
+        let last = offset.checked_add(other.next_id).filter(|last| *last <= MOST_MERGED_ID);
+        let last = last.ok_or_else(|| EditError::Taken("every id".to_owned()))?;
         self.reserve_ids_up_to(last);
         let renumber = |id: u64| id.saturating_add(offset);
         let mut edits: Vec<Edit> = Vec::new();

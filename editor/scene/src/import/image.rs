@@ -4,7 +4,7 @@
 use std::io::Cursor;
 use std::sync::Arc;
 
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
 
 use super::{basis, image_guard};
 
@@ -62,15 +62,20 @@ pub(super) fn decode(bytes: Vec<u8>, max_extent_px: u32) -> Result<Pixels, Strin
     Ok(Pixels { width, height, rgba8: image.into_raw().into(), placeholder: false, of_print, encoded })
 }
 
-/// What the texels of an image take once they are decoded, bytes, as its head says; 0 where that cannot be read.
-pub(super) fn texel_bytes(bytes: &[u8]) -> u64 {
+/// What the texels of an image take once they are decoded, bytes, as its head says; 0 where [`decode`] refuses it by its head.
+pub(super) fn texel_bytes(bytes: &[u8], max_extent_px: u32) -> u64 {
     let size = match bytes.starts_with(basis::MAGIC) {
         true => basis::dimensions(bytes),
         false => image_guard::guarded(|| {
             let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-            reader.map_err(|error| error.to_string())?.into_dimensions().map_err(|error| error.to_string())
+            let reader = reader.map_err(|error| error.to_string())?;
+            let format = reader.format();
+            let decoder = reader.into_decoder().map_err(|error| error.to_string())?;
+            image_guard::check_size(&decoder, format, bytes.len())?;
+            Ok(decoder.dimensions())
         }),
     };
+    let size = size.ok().filter(|(width, height)| *width.max(height) <= max_extent_px);
     size.map_or(0, |(width, height)| u64::from(width) * u64::from(height) * 4)
 }
 

@@ -19,7 +19,10 @@ fn from_1_to_2(mut value: Value) -> Value {
     if let Value::Object(map) = &mut value {
         map.insert("caustica".to_owned(), 2.into());
         if let Some(foreign) = map.remove("shapes") {
-            map.insert("shapesOfVersion1".to_owned(), foreign);
+            let longer = |name: &String| Some(format!("{name}_"));
+            let names = std::iter::successors(Some("shapesOfVersion1".to_owned()), longer);
+            let free = names.into_iter().find(|name| !map.contains_key(name)).unwrap_or_default();
+            map.insert(free, foreign);
         }
     }
     value

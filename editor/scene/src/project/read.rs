@@ -97,8 +97,8 @@ pub(super) struct Loader<'a> {
     shared: HashMap<PathBuf, Option<Result<Imported, ImportError>>>,
 }
 
-/// Beyond it a file leaves no room for ids that the document gives out.
-const MOST_ID: u64 = 1 << 62;
+/// Beyond it a file leaves no room for ids that the document gives out; twice what merging leads to at most.
+const MOST_ID: u64 = 2 * crate::document::MOST_MERGED_ID;
 
 impl<'a> Loader<'a> {
     /// The document of a project that stands at `path`. `own_paths`: they are absolute because the program wrote them so.

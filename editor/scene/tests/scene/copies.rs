@@ -96,6 +96,11 @@ fn a_merged_document_stands_beside_what_is_there() {
     assert!(saved_and_read(&document, folder.path()) == document);
     document.apply(undo).unwrap();
     assert!(document == before);
+    let mut far = other.document.clone();
+    far.reserve_ids_up_to(1 << 62);
+    let full = document.merge_edit(&far, "far").unwrap_err();
+    assert!(full.to_string().contains("every id is already in the scene"), "{full}");
+    assert!(saved_and_read(&far, folder.path()) == far, "what is near the end can be saved and read");
     let nothing = document.merge_edit(&Document::new(), "nothing").unwrap_err();
     assert!(nothing.to_string().contains("nothing in nothing"), "{nothing}");
 }

@@ -175,3 +175,31 @@ fn images_of_the_same_bytes_are_decoded_once_and_counted_before() {
         load(&path, &ImportOptions { max_image_bytes: bytes - 1, ..options }).unwrap_err().to_string();
     assert!(refused.contains("/images/0: with the images before it, decoded, it becomes"), "{refused}");
 }
+
+#[test]
+fn an_image_that_cannot_be_one_is_a_checker_and_counts_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    // A head of KTX 2 that claims the largest sides there are, and the first bytes of a PNG that claims more than it can hold.
+    let mut ktx = b"\xabKTX 20\xbb\r\n\x1a\n".to_vec();
+    ktx.extend([0, 1, u32::MAX, u32::MAX, 0, 0, 1, 1, 1].into_iter().flat_map(u32::to_le_bytes));
+    ktx.resize(216, 0);
+    std::fs::write(folder.path().join("a.ktx2"), ktx).unwrap();
+    let mut png = Vec::new();
+    image::RgbaImage::new(1, 1)
+        .write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png)
+        .unwrap();
+    for at in [16, 20] {
+        png[at..at + 4].copy_from_slice(&65000_u32.to_be_bytes());
+    }
+    std::fs::write(folder.path().join("b.png"), png).unwrap();
+    let images = json!([{"uri": "a.ktx2"}, {"uri": "b.png"}]);
+    let textures = json!([{"source": 0}, {"source": 1}]);
+    let of = |i: usize| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}});
+    let members = json!({"images": images, "textures": textures, "materials": [of(0), of(1)]});
+    let imported = load(&write(folder.path(), 1, members), &ImportOptions::default()).unwrap();
+    let said: Vec<String> = imported.warnings.iter().map(ToString::to_string).collect();
+    for index in 0..2 {
+        let place = format!("/images/{index}: the image cannot be read");
+        assert!(said.iter().any(|words| words.contains(&place)), "{place}: {said:?}");
+    }
+}

@@ -122,6 +122,8 @@ fn run(
     until: Until,
     progress: &ProgressBar,
 ) -> anyhow::Result<Vec<Stop>> {
+    // Some samplers spread as many points as there will be.
+    session.set_sample_target(Some(until.samples))?;
     begin(session, settings, extent)?;
     progress.set_length(until.samples);
     let before_ms = session.total_device_ms();
@@ -138,6 +140,7 @@ fn run(
         stops.push(Stop { samples: next, gpu_ms, wall_s, picture: session.read_back()? });
         // The next stop takes as long again.
         if next >= until.samples || wall_s * 2.0 > until.seconds {
+            session.set_sample_target(None)?;
             return Ok(stops);
         }
         next = (next * 2).min(until.samples);

@@ -93,7 +93,7 @@ impl<'a> Maps<'a> {
         let pixels = known.unwrap_or_else(|| {
             let read = path.and_then(|path| {
                 let bytes = read_file(&path, MAX_IMAGE_FILE_BYTES)?;
-                self.taken = self.taken.saturating_add(texel_bytes(&bytes));
+                self.taken = self.taken.saturating_add(texel_bytes(&bytes, self.options.max_image_extent_px));
                 let refusal = memory::refusal(self.taken, self.options.max_image_bytes);
                 refusal.map_or(Ok(()), |reason| Err(format!("with the images before it, {reason}")))?;
                 let pixels = decode(bytes, self.options.max_image_extent_px)?;

@@ -75,8 +75,10 @@ impl<'a> Images<'a> {
             .into_par_iter()
             .filter_map(|index| Some((index, self.encoded(self.items.get(index)?))))
             .collect();
+        let extent_px = self.options.max_image_extent_px;
         for (index, bytes) in &encoded {
-            self.taken = self.taken.saturating_add(bytes.as_deref().map_or(0, texel_bytes));
+            let texels = bytes.as_deref().map_or(0, |bytes| texel_bytes(bytes, extent_px));
+            self.taken = self.taken.saturating_add(texels);
             if let Some(reason) = memory::refusal(self.taken, self.options.max_image_bytes) {
                 return Err(Fault::new(
                     format!("/images/{index}"),
@@ -84,7 +86,6 @@ impl<'a> Images<'a> {
                 ));
             }
         }
-        let extent_px = self.options.max_image_extent_px;
         let decoded: BTreeMap<usize, Result<Pixels, String>> = encoded
             .into_par_iter()
             .map(|(index, bytes)| (index, bytes.and_then(|bytes| decode(bytes, extent_px))))

@@ -101,6 +101,7 @@ impl ErrorWatch {
     pub fn look(&mut self, session: &mut Session) {
         let subject = subject_of(session);
         self.keep_reference(session, subject);
+        session.stops_early(self.making.is_none());
         self.flip.poll();
         let statistics = session.statistics();
         if self.resets != Some(statistics.resets) {

@@ -13,7 +13,7 @@ const OP_TRACE_RAY: u32 = 4445;
 
 /// Those of Vulkan 1.3 without a feature, with its groups of invocations, and of the features that devices are opened with
 /// (`renderer/gpu/src/device_choice.rs`).
-const CAPABILITIES: [Capability; 26] = [
+const CAPABILITIES: [Capability; 25] = [
     Capability::Matrix,
     Capability::Shader,
     Capability::Geometry,
@@ -39,7 +39,6 @@ const CAPABILITIES: [Capability; 26] = [
     Capability::SampledImageArrayNonUniformIndexing,
     Capability::PhysicalStorageBufferAddresses,
     Capability::DemoteToHelperInvocation,
-    Capability::VariablePointersStorageBuffer,
 ];
 
 /// Holds a stage against what devices are opened with.
@@ -48,7 +47,6 @@ const CAPABILITIES: [Capability; 26] = [
 /// [`RendererError::Compile`] naming what is too much.
 pub(super) fn check(source: &Source, words: &[u32]) -> Result<()> {
     let mut faults = Vec::new();
-    let traces_here = source.file.ends_with(".rgen");
     let mut traces = false;
     for instruction in instructions(words) {
         match instruction {
@@ -65,7 +63,7 @@ pub(super) fn check(source: &Source, words: &[u32]) -> Result<()> {
             _ => {}
         }
     }
-    if traces && !traces_here {
+    if traces && !source.file.ends_with(".rgen") {
         let message =
             "rays are traced by ray generation shaders alone: pipelines are made for a depth of one";
         faults.push(ShaderFault::at(source, &["traceRayEXT("], message));

@@ -168,7 +168,7 @@ impl Animated for Camera {
             Projection::Orthographic { ymag_m } => one(ymag_m),
             Projection::Perspective { .. } => None,
         }),
-        row("orthographic/znear", ABOVE_ZERO, |camera| one(&mut orthographic(camera)?.near_m)),
+        row("orthographic/znear", POSITIVE, |camera| one(&mut orthographic(camera)?.near_m)),
         row("orthographic/zfar", ABOVE_ZERO, |camera| one(orthographic(camera)?.far_m.get_or_insert(1.0))),
     ];
 }

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::record::NodeRecord;
 use crate::animation::hold;
-use crate::assets::{Camera, Light, LightKind, Material};
+use crate::assets::{Camera, Light, LightKind, Material, Projection};
 use crate::import::gltf::{DEFAULT_NEAR_M, LEAST_CONE_RAD};
 
 /// Holds the numbers of a material. `place`: its JSON pointer.
@@ -58,7 +58,9 @@ fn held_light(light: &mut Light) {
 fn held_camera(camera: &mut Camera) {
     above_zero(&mut camera.far_m);
     above_zero(&mut camera.aspect);
-    if camera.near_m <= 0.0 {
+    // Parallel cameras may begin where they are.
+    let may_be_zero = matches!(camera.projection, Projection::Orthographic { .. });
+    if camera.near_m < 0.0 || camera.near_m == 0.0 && !may_be_zero {
         camera.near_m = camera.far_m.map_or(DEFAULT_NEAR_M, |far_m| DEFAULT_NEAR_M.min(far_m / 2.0));
     }
     camera.far_m = camera.far_m.filter(|far_m| *far_m > camera.near_m);
@@ -135,6 +137,9 @@ mod tests {
         let mut camera = Camera { near_m: -1.0, far_m: Some(0.001), aspect: Some(0.0), ..Camera::default() };
         assert_eq!(told(&mut camera, "", held_camera).len(), 2);
         assert_eq!((camera.near_m, camera.far_m, camera.aspect), (0.0005, Some(0.001), None));
+        let projection = Projection::Orthographic { ymag_m: 1.0 };
+        let mut parallel = Camera { projection, near_m: 0.0, ..Camera::default() };
+        assert_eq!(told(&mut parallel, "", held_camera), []);
         let mut camera = Camera { near_m: 2.0, far_m: Some(1.0), ..Camera::default() };
         assert_eq!(
             told(&mut camera, "", held_camera),

@@ -66,6 +66,8 @@ struct Making {
 pub struct ErrorWatch {
     /// Oldest first.
     pub curves: Vec<LiveCurve>,
+    /// The error at which no more samples are taken; 0.01 is 1 %.
+    pub stop_at: Option<f64>,
     /// Samples of the next reference.
     pub reference_samples: u64,
     /// What was done with the reference last, for the panel.
@@ -85,6 +87,7 @@ impl Default for ErrorWatch {
     fn default() -> Self {
         Self {
             curves: Vec::new(),
+            stop_at: None,
             reference_samples: 256,
             note: String::new(),
             resets: None,
@@ -101,7 +104,8 @@ impl ErrorWatch {
     pub fn look(&mut self, session: &mut Session) {
         let subject = subject_of(session);
         self.keep_reference(session, subject);
-        session.stops_early(self.making.is_none());
+        // A reference is made to its end.
+        session.set_stop_at(self.stop_at.filter(|_| self.making.is_none()));
         self.flip.poll();
         let statistics = session.statistics();
         if self.resets != Some(statistics.resets) {

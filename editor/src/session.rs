@@ -86,7 +86,6 @@ pub struct Session {
     host_times: HostTimes,
     /// No more samples once the error is so small, as a share: 0.01 is 1 %.
     stop_at: Option<f64>,
-    stops_early: bool,
     device: Arc<Device>,
 }
 
@@ -139,7 +138,6 @@ impl Session {
             tally: Tally::default(),
             host_times: HostTimes::default(),
             stop_at: None,
-            stops_early: true,
             device: Arc::clone(device),
         })
     }

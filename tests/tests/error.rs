@@ -25,8 +25,7 @@ fn open(session: &mut Session, path: &Path) {
 }
 
 fn frame(session: &mut Session) {
-    let recorder = session.begin_frame(EXTENT).expect("a frame");
-    session.submit(recorder, None).expect("a submission");
+    session.render_frame(EXTENT).expect("a frame");
 }
 
 /// Renders so many samples; the error is measured with the last one.

@@ -131,7 +131,7 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui) {
     let tip = "1 / (relMSE x seconds on the device), with the interval that holds it in 95 of 100 cases: how much a second buys";
     row(ui, "Buys", of(noise.efficiency(seconds), 1), tip);
     // Half of the noise takes four times as long, whatever is asked for.
-    let target = cx.session.stop_at().unwrap_or(noise.error().value / 2.0);
+    let target = cx.state.error.stop_at.unwrap_or(noise.error().value / 2.0);
     let words = format!("{} s to {}", of(noise.seconds_to(target, seconds), 1), percent(target));
     let tip = "More seconds on the device until the noise is so small (what is stopped at, else half of it), as it falls with the samples";
     row(ui, "Time", words, tip);
@@ -204,17 +204,15 @@ fn reference(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 fn stop(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
-        let mut on = cx.session.stop_at().is_some();
-        let mut percent = cx.session.stop_at().unwrap_or(0.01) * 100.0;
+        let stop_at = &mut cx.state.error.stop_at;
+        let mut on = stop_at.is_some();
+        let mut percent = stop_at.unwrap_or(0.01) * 100.0;
         let tip =
             "Takes no more samples once the noise, or the error where there is a reference, is so small";
         ui.checkbox(&mut on, "Stop at").on_hover_text(tip);
         let value = DragValue::new(&mut percent).range(0.01..=100.0).speed(0.02).max_decimals(2).suffix(" %");
         ui.add_enabled(on, value);
-        let wanted = on.then_some(percent / 100.0);
-        if wanted != cx.session.stop_at() {
-            cx.session.set_stop_at(wanted);
-        }
+        *stop_at = on.then_some(percent / 100.0);
     });
 }
 

@@ -43,20 +43,9 @@ impl Session {
         self.stop_at = error;
     }
 
-    /// Whether the picture is not to be better than was asked for; a reference is.
-    pub fn stops_early(&mut self, stops: bool) {
-        self.stops_early = stops;
-    }
-
-    /// The error at which no more samples are taken.
-    pub fn stop_at(&self) -> Option<f64> {
-        self.stop_at
-    }
-
     /// Whether the picture is as good as was asked for.
     pub(super) fn is_good_enough(&self) -> bool {
-        let target = self.stop_at.filter(|_| self.stops_early);
-        let (Some(target), Some(error)) = (target, self.live_error()) else { return false };
+        let (Some(target), Some(error)) = (self.stop_at, self.live_error()) else { return false };
         let found = error.against.map(|against| against.split.total);
         found.or_else(|| Some(error.noise?.error().value)).is_some_and(|found| found <= target)
     }

@@ -111,14 +111,11 @@ impl ShaderLibrary {
             return Ok(stage);
         }
         let stage = match self.compiled(file, &self.sources()) {
-            Err(error) if self.is_edited() => match self.compiled(file, &ShaderSources::default()) {
-                Ok(built_in) => {
-                    lock(&self.replaced).extend(ShaderFault::of_error(error));
-                    built_in
-                }
-                Err(_) => return Err(error),
-            },
-            other => other?,
+            Ok(stage) => stage,
+            Err(error) => {
+                self.fall_back(&[file], error)?;
+                return self.stage(file);
+            }
         };
         if self.is_edited() {
             let built_in = ShaderSources::default().load(file).map(|source| source.texts).unwrap_or_default();

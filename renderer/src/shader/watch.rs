@@ -67,11 +67,10 @@ impl Watch {
         changed: impl Fn(Vec<PathBuf>) + Clone + Send + Sync + 'static,
     ) -> Self {
         let (signals, inbox) = channel();
-        let places = places(folder);
+        let (places, files) = places(folder);
         let (how, watcher) = watched(folder, &changed, &signals);
         let how = Arc::new(Mutex::new(how));
         let (folder, shared) = (folder.to_owned(), Arc::clone(&how));
-        let files = linked_files(&places);
         let guard = Guard { folder, changed, how: shared, signals: signals.clone(), places, files, watcher };
         let thread = std::thread::Builder::new().name("shader folder".to_owned());
         let thread = thread.spawn(move || guard.run(&inbox));
@@ -108,19 +107,20 @@ impl<F: Fn(Vec<PathBuf>) + Clone + Send + Sync + 'static> Guard<F> {
                     Signal::End => return,
                 }
             }
-            if is_another || is_due && self.places != places(&self.folder) {
+            let (places, files) = match is_due {
+                true => places(&self.folder),
+                false => (self.places.clone(), self.files.keys().map(|l| (l.clone(), stamp(l))).collect()),
+            };
+            if is_another || self.places != places {
                 self.watch_again();
+            } else {
+                self.look_behind_links(files);
             }
-            self.look_behind_links(is_due);
         }
     }
 
-    /// Where a link leads to a file, the system tells of the link alone.
-    fn look_behind_links(&mut self, may_be_others: bool) {
-        let now = match may_be_others {
-            true => linked_files(&self.places),
-            false => self.files.keys().map(|link| (link.clone(), stamp(link))).collect(),
-        };
+    /// Where a link leads to a file, the system tells of the link alone. `now`: all such links.
+    fn look_behind_links(&mut self, now: Files) {
         let is_another =
             |(link, stamp): (&PathBuf, &Stamp)| self.files.get(link).is_some_and(|old| old != stamp);
         let changed: Vec<PathBuf> =
@@ -142,8 +142,7 @@ impl<F: Fn(Vec<PathBuf>) + Clone + Send + Sync + 'static> Guard<F> {
     /// Another folder is in the place of the one that was watched, or none, or a link leads elsewhere.
     fn watch_again(&mut self) {
         let folder = self.folder.display();
-        self.places = places(&self.folder);
-        self.files = linked_files(&self.places);
+        (self.places, self.files) = places(&self.folder);
         if self.places.values().next().is_some_and(Option::is_some) {
             let (how, watcher) = watched(&self.folder, &self.changed, &self.signals);
             tracing::warn!("{folder}: another folder is there now, or below it; it is watched from now on");
@@ -190,29 +189,10 @@ fn stamp(link: &Path) -> Stamp {
     Some((link.canonicalize().ok()?, about.modified().ok()?, about.len()))
 }
 
-/// The links to files in the watched folders.
-fn linked_files(places: &Places) -> Files {
-    let mut files = Files::new();
-    let mut seen = BTreeSet::new();
-    let mut waiting: Vec<PathBuf> = places.keys().cloned().collect();
-    while let Some(next) = waiting.pop() {
-        if !next.canonicalize().is_ok_and(|real| seen.insert(real)) {
-            continue;
-        }
-        for entry in std::fs::read_dir(&next).into_iter().flatten().flatten() {
-            let (path, kind) = (entry.path(), entry.file_type().ok());
-            if kind.is_some_and(|kind| kind.is_dir()) {
-                waiting.push(path);
-            } else if kind.is_some_and(|kind| kind.is_symlink()) && path.is_file() {
-                files.insert(path.clone(), stamp(&path));
-            }
-        }
-    }
-    files
-}
-
-fn places(folder: &Path) -> Places {
+/// The folder and the links to folders below it, and the links to files in all of them.
+fn places(folder: &Path) -> (Places, Files) {
     let mut places = Places::from([(folder.to_owned(), identity(folder))]);
+    let mut files = Files::new();
     // By where they really are, as links may lead in a circle.
     let mut seen = BTreeSet::new();
     let mut waiting = vec![folder.to_owned()];
@@ -225,13 +205,15 @@ fn places(folder: &Path) -> Places {
             let is_link = kind.is_some_and(|kind| kind.is_symlink());
             if is_link && path.is_dir() {
                 places.insert(path.clone(), identity(&path));
+            } else if is_link && path.is_file() {
+                files.insert(path.clone(), stamp(&path));
             }
             if kind.is_some_and(|kind| kind.is_dir()) || places.contains_key(&path) {
                 waiting.push(path);
             }
         }
     }
-    places
+    (places, files)
 }
 
 /// Starts to watch; how, and what does.

@@ -7,8 +7,8 @@ use caustica_tests::studio::Studio;
 
 use super::{Folder, Save, picture, studio, until};
 
-/// Saves a text in which something was replaced and waits for what is wrong with it.
-fn refused(folder: &Folder, studio: &mut Studio, file: &str, what: (&str, &str)) -> String {
+/// Saves a text in which something was replaced: it is refused in these words, and the picture stays.
+fn assert_refused(folder: &Folder, studio: &mut Studio, file: &str, what: (&str, &str), words: &[&str]) {
     let text = folder.text(file);
     let wrong = text.replacen(what.0, what.1, 1);
     assert_ne!(text, wrong, "{file} has no {}", what.0);
@@ -18,7 +18,8 @@ fn refused(folder: &Folder, studio: &mut Studio, file: &str, what: (&str, &str))
     assert!(picture(studio) == good, "{file}: another picture");
     folder.save(file, &text, Save::InPlace);
     until(studio, file, |status| status.faults.is_empty());
-    status.faults.iter().map(|fault| format!("{fault}\n")).collect()
+    let said: String = status.faults.iter().map(|fault| format!("{fault}\n")).collect();
+    assert!(words.iter().all(|word| said.contains(word)), "{file}: {said}");
 }
 
 /// What no compiler sees, as each file is right by itself.
@@ -93,8 +94,7 @@ fn what_does_not_fit_the_host_or_the_other_stages_is_named() {
             &["post.comp:", "without '.', '..' or empty parts"],
         ),
     ] {
-        let said = refused(&folder, &mut studio, file, what);
-        assert!(words.iter().all(|word| said.contains(word)), "{file}: {said}");
+        assert_refused(&folder, &mut studio, file, what, words);
     }
 }
 
@@ -118,8 +118,7 @@ fn what_a_fragment_shader_takes_and_writes_is_held_against_what_there_is() {
             &["visibility.frag:", "'more' at location 0: expected u32 for Rgba32Uint, found vec4<f32>"],
         ),
     ] {
-        let said = refused(&folder, &mut studio, file, what);
-        assert!(words.iter().all(|word| said.contains(word)), "{file}: {said}");
+        assert_refused(&folder, &mut studio, file, what, words);
     }
 }
 

@@ -20,8 +20,8 @@ fn from_1_to_2(mut value: Value) -> Value {
         map.insert("caustica".to_owned(), 2.into());
         if let Some(foreign) = map.remove("shapes") {
             let longer = |name: &String| Some(format!("{name}_"));
-            let names = std::iter::successors(Some("shapesOfVersion1".to_owned()), longer);
-            let free = names.into_iter().find(|name| !map.contains_key(name)).unwrap_or_default();
+            let mut names = std::iter::successors(Some("shapesOfVersion1".to_owned()), longer);
+            let free = names.find(|name| !map.contains_key(name)).unwrap_or_default();
             map.insert(free, foreign);
         }
     }

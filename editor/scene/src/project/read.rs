@@ -67,21 +67,17 @@ pub(super) fn parse(bytes: &[u8]) -> Result<ProjectFile, ProjectProblem> {
     if found > SCHEMA_VERSION {
         return Err(ProjectProblem::Newer { found });
     }
-    if found < SCHEMA_VERSION {
-        let value = migrate::to_newest(found, value);
-        let record =
-            serde_json::from_value(value.clone()).map_err(|error| fault::of_field(&value, bytes, error))?;
-        lists::require_room(bytes.len(), &value, &record)?;
-        return Ok(ProjectFile::new(record, &value)?);
-    }
-    // From the text again, so that errors name a line too.
-    match serde_json::from_slice(bytes) {
-        Ok(record) => {
-            lists::require_room(bytes.len(), &value, &record)?;
-            Ok(ProjectFile::new(record, &value)?)
+    let (value, record) = match found < SCHEMA_VERSION {
+        true => {
+            let value = migrate::to_newest(found, value);
+            (value.clone(), serde_json::from_value(value))
         }
-        Err(error) => Err(fault::of_field(&value, bytes, error)),
-    }
+        // From the text again, so that errors name a line too.
+        false => (value, serde_json::from_slice(bytes)),
+    };
+    let record = record.map_err(|error| fault::of_field(&value, bytes, error))?;
+    lists::require_room(bytes.len(), &value, &record)?;
+    Ok(ProjectFile::new(record, &value)?)
 }
 
 /// A document that comes into being, from a project and from what a journal adds to it.
